@@ -1,0 +1,79 @@
+"""The paper's explicit two-step scheme."""
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from numpy.typing import NDArray
+
+from discs.integrators.base import Frame, Integrator, Work
+from discs.integrators.rk4 import RK4
+from discs.system import Phase, RollingSystem, add
+
+
+class TwoStep(NamedTuple):
+    """What the scheme remembers: q_n = hi + lo, and the moves q_n - q_{n-1} and q_{n+1} - q_n, all (3, n)."""
+
+    hi: NDArray
+    lo: NDArray
+    last: NDArray
+    next: NDArray
+
+
+@dataclass(frozen=True)
+class Leapfrog(Integrator):
+    r"""Central differences in time with the constraint at n, the paper's section 4.3 ((discconstr1), (discconstr2)):
+
+    M (q_{n+1} - 2 q_n + q_{n-1})/h^2 = -S q_n + A(q_n)^T lambda,   A(q_n) (q_{n+1} - q_{n-1}) = 0.
+
+    With q* = 2 q_n - q_{n-1} - h^2 M^{-1} S q_n, the admissible move q_{n+1} - q_{n-1} = (e, 1) u of a disc is the
+    projection of q* - q_{n-1}: (alpha + rho |e|^2) u = rho e.(r* - r_{n-1}) + alpha (theta* - theta_{n-1}).
+
+    It conserves |v|^2/2 + V(q_n, q_{n+1}) exactly, v = (q_{n+1} - q_n)/h weighed with the masses and V the bilinear form
+    ("modified_energy"): multiply by q_{n+1} - q_{n-1}, which A annihilates. It needs h <= k^2/2 sqrt(rho/K), and carries
+    a parasitic mode: the part of v off the constraint can flip its sign every step, and grow.
+
+    The move before the first one and frames between steps come from a Runge-Kutta step; velocities at frames are the
+    central differences (q_{n+1} - q_{n-1})/2h.
+    """
+
+    name: ClassVar[str] = "leapfrog"
+    order: ClassVar[int] = 2
+    preserves: ClassVar[str] = "a modified energy exactly; the rolling constraint of the central differences"
+    reference: ClassVar[str] = "Vankerschaver, A class of nonholonomic kinematic constraints in elasticity, section 4.3"
+    explicit: ClassVar[bool] = True
+    offers: ClassVar[tuple[str, ...]] = ("modified_energy",)
+
+    def begin(self, system: RollingSystem, z: Phase, h: float, work: Work) -> TwoStep:
+        first = RK4().step(system, z, h, work)
+        move = (first.hi - z.hi) + (first.lo - z.lo)
+        central = 2 * h * system.frame(system.links(z.hi, z.lo)) * z.pi
+        return TwoStep(z.hi, z.lo, central - move, move)
+
+    def advance(self, system: RollingSystem, memory: TwoStep, h: float, work: Work) -> TwoStep:
+        hi, lo = add(memory.hi, memory.lo, memory.next)
+        d = system.links(hi, lo)
+        e = system.contact(d)
+        gradient = system.gradient(d)
+        work.gradients += 1
+        # the free move from q_{n-1} to q*, times the masses
+        x, y, theta = 2 * system.weights * memory.next - h * h * gradient
+        u = (e[0] * x + e[1] * y + theta) / system.inertia(e)
+        following = -memory.next
+        following[:2] += e * u
+        following[2] += u
+        return TwoStep(hi, lo, memory.next, following)
+
+    def at(self, system: RollingSystem, memory: TwoStep, tau: float, h: float) -> Frame:
+        rate = (memory.last + memory.next) / (2 * h)
+        if not tau:
+            return Frame(memory.hi, memory.lo, rate)
+        z = Phase(memory.hi, memory.lo, rate[2] / system.frame(system.links(memory.hi, memory.lo))[2])
+        return RK4().at(system, z, tau, h)
+
+    def kinetic(self, system: RollingSystem, memory: TwoStep, h: float) -> float:
+        return system.kinetic(memory.next / h)
+
+    def extras(self, system: RollingSystem, memory: TwoStep, h: float) -> dict[str, float]:
+        d = system.links(memory.hi, memory.lo)
+        polarised = system.potential(d, d + system.increments(memory.next))
+        return {"modified_energy": self.kinetic(system, memory, h) + polarised}

@@ -1,0 +1,216 @@
+"""The one door to a run: `simulate(problem, method, ...)`."""
+
+import time as clock
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.linalg import LinearOperator, eigsh
+from tqdm import tqdm
+
+from discs import checks
+from discs.integrators import Integrator, Work, find
+from discs.problem import Problem
+from discs.solution import Solution
+
+WANTS = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y")}
+LOST_HEADING = 1e-3
+
+
+class SimulationError(RuntimeError):
+    """A run that could not go on.
+
+    Attributes
+    ----------
+    step, time, disc : where it stopped.
+    """
+
+    def __init__(self, message: str, step: int, time: float, disc: int) -> None:
+        super().__init__(f"{message} (step {step}, time {time:g}, disc {disc})")
+        self.step, self.time, self.disc = step, time, disc
+
+
+def simulate(
+    problem: Problem,
+    method: str | Integrator = "midpoint",
+    dt: float | None = None,
+    frames: int | ArrayLike = 101,
+    want: Iterable[str] = (),
+    progress: bool = True,
+) -> Solution:
+    """Run a problem.
+
+    Parameters
+    ----------
+    problem : what to compute.
+    method : name of an integrator ("midpoint", "suzuki4", "rk4", "leapfrog"), or one with its own settings, as
+        `Midpoint(sweeps=2)`.
+    dt : time step; None takes `suggest_dt(problem, method)`.
+    frames : how many frames, equally spaced over the duration, or their times, increasing. A frame between two steps is
+        reached by a shorter step of its own, so asking for frames never changes the trajectory.
+    want : what else to record: "velocity", "slope", and what the method offers (leapfrog: "modified_energy").
+    progress : show a progress bar on anything that takes over a second.
+
+    Returns
+    -------
+    Solution with exactly the frames asked for.
+
+    Raises
+    ------
+    ValueError : for an unknown method or quantity, a step that is not positive, or frames outside the duration.
+    SimulationError : as soon as the kinetic energy exceeds ten times the total energy of the start, which no exact
+        motion does, something is not finite, or (rolling="unit") a disc loses its heading.
+    """
+    integrator = find(method)
+    want = _wanted(want, integrator)
+    suggested = dt is None
+    h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
+    times = _frame_times(frames, problem.duration)
+    system, n = problem.system, problem.chain.n
+    # the number of whole steps before a frame; a frame within rounding of a step is taken at the step
+    before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
+    after = np.where(times - before * h > 1e-9 * h, times - before * h, 0.0)
+
+    rows = {name: np.empty((len(times), n)) for name in ("x", "y", "theta", "omega")}
+    rows |= {name: np.empty((len(times), n)) for w in want if w in WANTS for name in WANTS[w]}
+    rows |= {name: np.empty(len(times)) for name in ("energy", "rolling_residual")}
+    rows |= {name: np.empty(len(times)) for name in want if name in integrator.offers}
+
+    def record(f: int) -> None:
+        frame = integrator.at(system, memory, after[f], h)
+        d = system.links(frame.hi, frame.lo)
+        slip = frame.rate[:2] - system.contact(d) * frame.rate[2]
+        rows["x"][f], rows["y"][f], rows["theta"][f] = frame.hi + frame.lo
+        rows["omega"][f] = frame.rate[2]
+        rows["energy"][f] = system.kinetic(frame.rate) + system.potential(d)
+        rows["rolling_residual"][f] = np.hypot(*slip).max()
+        if "velocity" in want:
+            rows["x_rate"][f], rows["y_rate"][f] = frame.rate[:2]
+        if "slope" in want:
+            rows["slope_x"][f], rows["slope_y"][f] = system.slope(d)
+        for name, value in integrator.extras(system, memory, h).items() if integrator.offers else ():
+            if name in want:
+                rows[name][f] = value
+
+    started = clock.perf_counter()
+    work = Work()
+    watch = _Watch(problem, h)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        memory: Any = integrator.begin(system, problem.start(), h, work)
+        step = 0
+        with tqdm(total=int(before[-1]), desc=integrator.name, unit="step", delay=1, disable=not progress) as bar:
+            for f, last in enumerate(before):
+                while step < last:
+                    previous, memory = memory, integrator.advance(system, memory, h, work)
+                    step += 1
+                    bar.update()
+                    watch.check(integrator, previous, memory, step)
+                record(f)
+    stats = {
+        "method": integrator.name,
+        "order": integrator.order,
+        "dt": h,
+        "dt_suggested": suggested,
+        "steps": step,
+        **vars(work),
+        "seconds": clock.perf_counter() - started,
+    }
+    return Solution(t=times, s=problem.chain.s, stats=stats, **rows)
+
+
+class _Watch:
+    """Stops a run that has gone wrong, and says where and why."""
+
+    def __init__(self, problem: Problem, h: float) -> None:
+        self.system, self.h = problem.system, h
+        self.unit = problem.chain.rolling == "unit"
+        # V >= 0 and H is constant, so the kinetic energy cannot exceed H; far below one unit of twist is rounding
+        chain = problem.chain
+        rounding = 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
+        self.bound = 10 * problem.energy() + rounding
+
+    def check(self, integrator: Integrator, previous: Any, memory: Any, step: int) -> None:
+        """Raise SimulationError if the step from `previous` to `memory` cannot be trusted."""
+        kinetic = integrator.kinetic(self.system, memory, self.h)
+        if self.unit:
+            self._check_heading(previous, memory, step)
+        if kinetic <= self.bound:
+            return
+        speed = np.abs(memory.hi[2] - previous.hi[2])
+        disc = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
+        if integrator.explicit:
+            cause = f"dt = {self.h:g} is above the stability limit of {integrator.name!r}: take a smaller dt or 'midpoint'"
+        else:
+            cause = "the step has lost all digits: take a smaller dt, fewer discs or softer springs"
+        what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
+        raise SimulationError(f"the run blew up, {what}; likely {cause}", step, step * self.h, disc)
+
+    def _check_heading(self, previous: Any, memory: Any, step: int) -> None:
+        """Closest approach of r' to zero on the straight line from one step to the next, for every disc."""
+        a = self.system.slope(self.system.links(previous.hi, previous.lo))
+        b = self.system.slope(self.system.links(memory.hi, memory.lo))
+        move = b - a
+        length = np.maximum((move * move).sum(axis=0), 1e-300)
+        nearest = a + move * np.clip(-(a * move).sum(axis=0) / length, 0.0, 1.0)
+        closest = np.hypot(*nearest)
+        disc = int(np.argmin(closest))
+        if closest[disc] < LOST_HEADING:
+            raise SimulationError(
+                "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
+                "end the run earlier, or take a smaller dt if the motion is not resolved",
+                step,
+                step * self.h,
+                disc,
+            )
+
+
+def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float:
+    """A step for a method: accurate to about 1e-3 for smooth motion if implicit, 0.7 of the stability limit if explicit.
+
+    Implicit: half the time a torsion wave takes from disc to disc, at most a hundredth of the duration.
+    Explicit: the limit is 2/Omega (two-step) or 2.8/Omega (rk4), Omega^2 the largest eigenvalue of C^T S C at the start;
+    0.7 leaves room for headings that grow.
+    """
+    integrator = find(method)
+    chain = problem.chain
+    if not integrator.explicit:
+        stiffest = np.max(chain.torsion_stiffness)
+        least = np.min(np.asarray(chain.spin_inertia) + np.asarray(chain.density) * np.asarray(chain.radius) ** 2)
+        wave = chain.k * np.sqrt(least / stiffest) if stiffest > 0 else np.inf
+        return float(min(0.5 * wave, problem.duration / 100))
+    omega = np.sqrt(_stiffest(problem))
+    limit = 2.0 if integrator.name == "leapfrog" else 2.8
+    return float(min(0.7 * limit / omega if omega > 0 else np.inf, problem.duration / 100))
+
+
+def _stiffest(problem: Problem) -> float:
+    """Largest eigenvalue of C^T S C at the initial state."""
+    system, z = problem.system, problem.start()
+    c = system.frame(system.links(z.hi, z.lo))
+
+    def apply(p: NDArray) -> NDArray:
+        return (c * system.gradient(system.increments(c * p.ravel()))).sum(axis=0)
+
+    n = problem.chain.n
+    if n < 40:
+        return float(np.linalg.eigvalsh(np.array([apply(row) for row in np.eye(n)])).max())
+    start = np.random.default_rng(0).standard_normal(n)
+    operator = LinearOperator((n, n), matvec=apply, dtype=float)
+    return float(eigsh(operator, k=1, which="LA", v0=start, tol=1e-3, return_eigenvectors=False)[0])
+
+
+def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:
+    given = (want,) if isinstance(want, str) else tuple(want)
+    return tuple(checks.choice("want", name, (*WANTS, *integrator.offers)) for name in given)
+
+
+def _frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
+    if np.ndim(frames) == 0:
+        count = checks.whole("frames", frames, 1, "the last state is always one")
+        return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])
+    times = np.asarray(frames, dtype=float)
+    inside = np.isfinite(times).all() and times.ndim == 1 and times.size and times[0] >= 0 and times[-1] <= duration
+    if not inside or (np.diff(times) <= 0).any():
+        raise ValueError(f"frames must be increasing times within [0, {duration:g}], or their number; got {frames!r}")
+    return times

@@ -1,0 +1,52 @@
+"""What a run returns."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A motion at F frames of N discs (or of a field on N nodes). Time is the first axis, discs are the last.
+
+    Attributes
+    ----------
+    t : (F,), times of the frames.
+    s : (N,), places along the rod, length.
+    x, y : (F, N), contact points, length.
+    theta : (F, N), roll angles, rad.
+    omega : (F, N), rates of roll, rad per time.
+    energy : (F,), kinetic and potential energy.
+    rolling_residual : (F,), largest |r. - e omega| over the discs, length per time: zero up to rounding.
+    stats : what was done: method, order, dt and where it came from, steps, work, seconds.
+    x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
+    slope_x, slope_y : (F, N), headings r', no unit; want "slope".
+    modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
+    error_estimate : for a field, {"x", "y", "theta", "omega"} -> estimated largest error over nodes and frames.
+    """
+
+    t: NDArray
+    s: NDArray
+    x: NDArray
+    y: NDArray
+    theta: NDArray
+    omega: NDArray
+    energy: NDArray
+    rolling_residual: NDArray
+    stats: dict[str, Any] = field(default_factory=dict)
+    x_rate: NDArray | None = None
+    y_rate: NDArray | None = None
+    slope_x: NDArray | None = None
+    slope_y: NDArray | None = None
+    modified_energy: NDArray | None = None
+    error_estimate: dict[str, float] | None = None
+
+    def __repr__(self) -> str:
+        frames, n = self.x.shape
+        drift = np.abs(self.energy - self.energy[0]).max()
+        return (
+            f"Solution({frames} frames of {n} discs, t = {self.t[0]:g} to {self.t[-1]:g}, "
+            f"method {self.stats.get('method')!r}, energy {self.energy[0]:.6g} to within {drift:.1e})"
+        )
