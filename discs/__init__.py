@@ -1,17 +1,18 @@
 """N rolling discs joined by springs: a finite-dimensional nonholonomic mechanical system."""
 
 from discs.chain import Chain
-from discs.integrators import Leapfrog, Midpoint, RK4, Suzuki4
+from discs.integrators import RK4, Integrator, Leapfrog, Midpoint, Suzuki4
 from discs.problem import Problem, State
 from discs.simulate import SimulationError, simulate, suggest_dt
 from discs.solution import Solution
 
 __all__ = [
+    "RK4",
     "Chain",
+    "Integrator",
     "Leapfrog",
     "Midpoint",
     "Problem",
-    "RK4",
     "SimulationError",
     "Solution",
     "State",

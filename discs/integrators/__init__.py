@@ -17,4 +17,4 @@ def find(method: str | Integrator) -> Integrator:
     return METHODS[checks.choice("method", method, METHODS)]()
 
 
-__all__ = ["METHODS", "Integrator", "Leapfrog", "Midpoint", "OneStep", "RK4", "Suzuki4", "Work", "find"]
+__all__ = ["METHODS", "RK4", "Integrator", "Leapfrog", "Midpoint", "OneStep", "Suzuki4", "Work", "find"]

@@ -1,0 +1,127 @@
+"""N discs against the field, N -> infinity."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from compare import figures
+from compare.lump import lump
+from continuum import Scene, solve
+from continuum.solve import spline
+from discs import Integrator, Midpoint, Solution, Suzuki4, checks, simulate
+
+FIELDS = ("x", "y", "theta")
+TIGHT = Suzuki4(Midpoint(tolerance=1e-10))
+COLUMNS = ("ends", "N", "k", *(f"error {f}" for f in FIELDS), *(f"order {f}" for f in FIELDS))
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Errors of chains of discs against the field at the end of a scene.
+
+    Attributes
+    ----------
+    scene : the scene.
+    ends : kind of ends of the chains.
+    n : (S,), numbers of discs.
+    k : (S,), spacings, length.
+    error : (S, 3), largest error over the discs of x, y (length) and theta (rad).
+    floor : estimated error of the field itself, the largest of x, y, theta.
+    dt : time step of the chains.
+    """
+
+    scene: Scene
+    ends: str
+    n: NDArray
+    k: NDArray
+    error: NDArray
+    floor: float
+    dt: float
+
+    @property
+    def order(self) -> NDArray:
+        """Measured order between neighbouring rows, (S - 1, 3): log of the ratio of errors over log of that of spacings."""
+        with np.errstate(divide="ignore"):
+            return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """The table as text, a row for each n; see COLUMNS."""
+        orders = [("", "", "")] + [tuple(f"{o:.2f}" for o in row) for row in self.order]
+        return [
+            (self.ends, str(n), f"{k:.6f}", *(f"{e:.3e}" for e in error), *order)
+            for n, k, error, order in zip(self.n, self.k, self.error, orders, strict=True)
+        ]
+
+    def table(self) -> str:
+        """The table, aligned for a terminal."""
+        return format_table([COLUMNS, *self.rows()])
+
+    def plot(self, path: str | Path | None = None, *others: "Study", ax: Axes | None = None) -> Axes:
+        """Error against n, with `others` in the same axes; saved if a path is given."""
+        ax = figures.convergence([self, *others], ax)
+        if path is not None:
+            figures.save(ax, path)
+        return ax
+
+
+def convergence(
+    scene: Scene,
+    n: tuple[int, ...] = (17, 33, 65, 129),
+    ends: str = "springs",
+    field: Solution | None = None,
+    dt: float | None = None,
+    method: str | Integrator = TIGHT,
+    tol: float = 1e-5,
+    progress: bool = True,
+) -> Study:
+    """Simulate a scene with n = n_1, n_2, ... discs and compare with the field at the end.
+
+    Parameters
+    ----------
+    n : numbers of discs, increasing, at least one.
+    ends : see `lump`.
+    field : the field's solution, solved to `tol` if not given; its last frame counts.
+    dt : time step of the chains; None takes the one with which the field met a quarter of its tolerance.
+    method : integrator of the chains.
+    """
+    sizes = np.atleast_1d(np.asarray(n))
+    if sizes.ndim != 1 or not sizes.size or sizes.dtype.kind not in "iu" or (np.diff(sizes) <= 0).any():
+        raise ValueError(f"n must be increasing whole numbers of discs; got {n!r}")
+    problems = [lump(scene, int(size), ends) for size in sizes]
+    if field is None:
+        field = solve(scene, tol, progress=progress)
+    h = field.stats["dt"] if dt is None else checks.number("dt", dt, positive=True)
+    limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in FIELDS}
+    error = np.empty((len(problems), len(FIELDS)))
+    bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
+    for i, problem in enumerate(bar):
+        run = simulate(problem, method, h, frames=1, progress=False)
+        for j, name in enumerate(FIELDS):
+            error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
+    floor = max(field.error_estimate[name] for name in FIELDS) if field.error_estimate else 0.0
+    k = np.array([problem.chain.k for problem in problems])
+    return Study(scene, problems[0].chain.ends, sizes, k, error, floor, h)
+
+
+def _periodic(scene: Scene, name: str, run: Solution) -> NDArray:
+    """A field (F, N) less the part that grows around a rod periodic up to a shift."""
+    shift = dict(zip(("x", "y"), scene.shift, strict=True)).get(name, 0.0)
+    return getattr(run, name) - shift * run.s / scene.rod.length
+
+
+def format_table(rows: list[tuple[str, ...]]) -> str:
+    """Rows of text as aligned columns, the first row the heading."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+
+
+def write_csv(path: Path, studies: list[Study]) -> None:
+    """The table of several studies as CSV."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([COLUMNS, *(row for study in studies for row in study.rows())])

@@ -1,0 +1,127 @@
+"""Pictures. Every function draws into the axes it is given, or new ones, and returns them; nothing opens a window."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter, ScalarFormatter
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+from numpy.typing import NDArray
+
+from continuum import Scene
+from discs import Solution
+
+if TYPE_CHECKING:
+    from compare.convergence import Study
+
+# Okabe and Ito's colours, distinct for colour-blind readers
+BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
+LABEL = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
+SYMBOL = ("x", "y", "θ")
+
+
+def _axes(ax: Axes | None, width: float, height: float) -> Axes:
+    return Figure(figsize=(width, height), layout="constrained").subplots() if ax is None else ax
+
+
+def save(ax: Axes, path: str | Path) -> None:
+    """Save the figure that an axes belongs to."""
+    ax.figure.savefig(path, dpi=150)
+
+
+def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
+    """Error against number of discs, log-log, with slopes 1 and 2 and the field's own error estimate."""
+    ax = _axes(ax, 6.4, 4.8)
+    for study, colour in zip(studies, (ORANGE, BLUE, GREEN, PURPLE), strict=False):
+        for j, (symbol, marker, line) in enumerate(zip(SYMBOL, "os^", ("-", "--", ":"), strict=True)):
+            label = f"{LABEL[study.ends]}, {symbol}"
+            ax.loglog(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
+    n = np.array([min(s.n[0] for s in studies), max(s.n[-1] for s in studies)], dtype=float)
+    for slope in (1, 2):
+        anchor = max(s.error[0].max() for s in studies) * 1.6
+        ax.loglog(n, anchor * (n / n[0]) ** -slope, color=GREY, linewidth=0.8)
+        middle = np.sqrt(n[0] * n[1])
+        ax.annotate(
+            f"slope {slope}",
+            (middle, anchor * (middle / n[0]) ** -slope),
+            xytext=(2, 4),
+            textcoords="offset points",
+            color=GREY,
+        )
+    floor = max(s.floor for s in studies)
+    if floor > 0:
+        ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label="estimated error of the field")
+    ticks = sorted({int(m) for s in studies for m in s.n})
+    ax.set_xticks(ticks, minor=False)
+    ax.xaxis.set_major_formatter(ScalarFormatter())
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    scene = studies[0].scene
+    ax.set_xlabel("number of discs N")
+    ax.set_ylabel("largest error over the discs (length, rad)")
+    ax.set_title(f"N discs against the field: {scene.name}, {scene.rolling} law, t = {scene.duration:g}")
+    ax.legend(fontsize=8, ncols=2)
+    ax.grid(alpha=0.3, which="major")
+    return ax
+
+
+def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
+    """The paper's figure of the motion: at each frame the centre line and the director d_3 = cos(theta) e_z + sin(theta) J d_1.
+
+    The last panel shows all centre lines from above.
+    """
+    columns = 3
+    rows = -(-(len(run.t) + 1) // columns)
+    figure = Figure(figsize=(4.0 * columns, 3.4 * rows), layout="constrained")
+    lines = [np.stack([run.x[f], run.y[f]]) for f in range(len(run.t))]
+    everything = np.concatenate(lines, axis=1)
+    middle, reach = everything.mean(axis=1), np.ptp(everything, axis=1).max() / 2 * 1.1
+    shown = np.unique(np.linspace(0, run.s.size - 1, arrows).round().astype(int))
+    for f, (x, y) in enumerate(lines):
+        ax: Axes3D = figure.add_subplot(rows, columns, f + 1, projection="3d")
+        tangent = np.gradient(np.stack([x, y]), run.s, axis=1)
+        tangent /= np.hypot(*tangent)
+        sine, cosine = np.sin(run.theta[f]), np.cos(run.theta[f])
+        d3 = np.array([-tangent[1] * sine, tangent[0] * sine, cosine])[:, shown]
+        ax.plot(x, y, 0, color=BLUE, linewidth=2)
+        ax.quiver(x[shown], y[shown], 0, *(0.6 * d3), color=ORANGE, linewidth=1, arrow_length_ratio=0.25)
+        _stage(ax, middle, reach)
+        ax.set_title(f"t = {run.t[f]:.3g}", y=0.98)
+    top: Any = figure.add_subplot(rows, columns, len(lines) + 1)
+    for f, (x, y) in enumerate(lines):
+        shade = 0.25 + 0.75 * f / max(len(lines) - 1, 1)
+        top.plot(x, y, color=BLUE, alpha=shade, label=f"t = {run.t[f]:.3g}")
+    top.set_aspect("equal")
+    top.set_xlabel("x")
+    top.set_ylabel("y")
+    top.set_title("centre lines from above")
+    top.legend(fontsize=8)
+    top.grid(alpha=0.3)
+    figure.suptitle(f"{scene.name}, {scene.rolling} law; arrows are the directors d₃")
+    return figure
+
+
+def _stage(ax: Axes3D, middle: NDArray, reach: float) -> None:
+    ax.set_xlim(middle[0] - reach, middle[0] + reach)
+    ax.set_ylim(middle[1] - reach, middle[1] + reach)
+    ax.set_zlim(-0.8, 0.8)
+    ax.set_box_aspect((1, 1, 0.8 / reach), zoom=1.25)
+    ax.set_zticks([])
+    ax.set_xlabel("x")
+    ax.set_ylabel("y")
+    ax.tick_params(labelsize=7)
+    ax.view_init(elev=35, azim=-65)
+
+
+def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
+    """Energy against time, all runs in the same axes."""
+    ax = _axes(ax, 7.2, 4.2)
+    for (label, run), colour in zip(runs.items(), (ORANGE, BLUE, GREEN, PURPLE), strict=False):
+        ax.plot(run.t, run.energy, color=colour, label=label, linewidth=1)
+    ax.set_xlabel("time t")
+    ax.set_ylabel("energy")
+    ax.legend()
+    ax.grid(alpha=0.3)
+    return ax

@@ -1,0 +1,64 @@
+"""The main job: one scene, N -> infinity, the motion and the energy."""
+
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+from compare import figures
+from compare.convergence import COLUMNS, Study, convergence, format_table, write_csv
+from compare.lump import lump
+from compare.outputs import fresh_files
+from continuum import Scene, solve
+from discs import Solution, simulate
+
+SIZES = (17, 33, 65, 129, 257, 513)
+LONG = 150.0
+INSTANTS = 5
+
+
+def overview(
+    scene: Scene, out: str | Path, n: tuple[int, ...] = SIZES, tol: float = 1e-5, progress: bool = True
+) -> list[Study]:
+    """Compare a scene's discs with its field; write the table and the pictures to `out`.
+
+    Writes convergence.csv, convergence.png, motion.png and energy.png, all of them or none.
+
+    Returns
+    -------
+    The studies, one for each kind of ends.
+    """
+    kinds = ("springs",) if scene.closed else ("springs", "consistent")
+    with fresh_files(out) as folder, ProcessPoolExecutor(1, mp_context=get_context("spawn")) as other:
+        energies = other.submit(long_runs, scene)
+        field = solve(scene, tol, frames=INSTANTS, progress=progress)
+        studies = [convergence(scene, n, ends, field=field, progress=progress) for ends in kinds]
+        write_csv(folder / "convergence.csv", studies)
+        studies[0].plot(folder / "convergence.png", *studies[1:])
+        figures.motion(field, scene).savefig(folder / "motion.png", dpi=150)
+        ax = figures.energy(energies.result())
+        ax.set_title(f"{scene.name}, {scene.rolling} law, energy over [0, {LONG:g}]")
+        figures.save(ax, folder / "energy.png")
+    return studies
+
+
+def long_runs(scene: Scene, n: int = 32) -> dict[str, Solution]:
+    """The scene over [0, 150] by the paper's explicit scheme and by the midpoint method, with n discs and the paper's ends."""
+    long = Scene(**{**vars(scene), "duration": LONG})
+    explicit = solve(long, method="leapfrog", n=n, frames=1001, progress=False)
+    problem = lump(long, n, ends="paper")
+    k = problem.chain.k
+    midpoint = simulate(problem, "midpoint", dt=k / 2, frames=1001, progress=False)
+    return {
+        f"the paper's explicit scheme, N = {n}, h = k²/8": explicit,
+        f"midpoint, N = {n}, h = k/2": midpoint,
+    }
+
+
+def summary(studies: list[Study]) -> str:
+    """The table of all studies, and what it is measured against."""
+    scene, floor = studies[0].scene, max(s.floor for s in studies)
+    table = format_table([COLUMNS, *(row for study in studies for row in study.rows())])
+    return (
+        f"{scene.name}, {scene.rolling} law, t = {scene.duration:g}: largest error over the discs "
+        f"against the field (estimated error {floor:.1e})\n{table}"
+    )

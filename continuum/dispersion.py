@@ -1,0 +1,58 @@
+"""Linear waves about the straight rod, continuous and for n discs; `model` in docs gives the derivation."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from continuum.rod import Rod
+from discs import checks
+from discs.chain import ROLLING
+
+
+class Symbols(NamedTuple):
+    """What stands for q^2 in second differences (stiffness) and for q in headings."""
+
+    second: NDArray
+    first: NDArray
+
+
+def symbols(q: ArrayLike, k: float | None = None) -> Symbols:
+    """q^2 and q, or for discs of spacing k their twins t = 4/k^2 sin^2(qk/2) and c = sin(qk)/k."""
+    q = np.asarray(q, dtype=float)
+    return Symbols(q**2, q) if k is None else Symbols((2 / k * np.sin(q * k / 2)) ** 2, np.sin(q * k) / k)
+
+
+def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> NDArray:
+    """Frequency Omega of small waves of the straight rod at rest: (alpha + rho R^2) Omega^2 = beta q^2 + K R^2 q^4.
+
+    Parameters
+    ----------
+    q : wave numbers, 1/length.
+    k : spacing of discs, None for the field.
+    """
+    t, _ = symbols(q, k)
+    return np.sqrt((rod.torsion_stiffness * t + rod.bending_stiffness * rod.radius**2 * t**2) / rod.inertia)
+
+
+def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: float | None = None) -> NDArray:
+    """Largest growth rate sigma of a perturbation of wave number q of the straight rod rolling sideways at rate omega.
+
+    Field law, with M = alpha + rho R^2: the positive root of
+
+        M sigma^4 + sigma^2 [beta q^2 + K R^2 q^4 - alpha R^2 omega^2 q^2] - beta R^2 omega^2 q^4 = 0;
+
+    sigma -> omega sqrt(beta/K) as q -> infinity, unbounded in q if K = 0. Unit law: zero.
+    """
+    checks.choice("rolling", rolling, ROLLING)
+    t, c = symbols(q, k)
+    if rolling == "unit":
+        return np.zeros_like(t)
+    r2, push = rod.radius**2, (omega * c) ** 2
+    b = rod.torsion_stiffness * t + rod.bending_stiffness * r2 * t**2 - rod.spin_inertia * r2 * push
+    last = rod.torsion_stiffness * r2 * push * t
+    root = np.sqrt(b**2 + 4 * rod.inertia * last)
+    # both forms of the positive root of M u^2 + b u - last, each where it does not cancel
+    with np.errstate(divide="ignore", invalid="ignore"):
+        square = np.where(b > 0, 2 * last / (root + b), (root - b) / (2 * rod.inertia))
+    return np.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square))

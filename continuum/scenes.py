@@ -1,0 +1,90 @@
+"""Named scenes. The rod's parameters are the paper's unless given by keyword."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from continuum.rod import Rod, Scene
+from discs import checks
+
+PAPER = {
+    "length": 4.0,
+    "density": 1.0,
+    "spin_inertia": 1.0,
+    "torsion_stiffness": 0.8,
+    "bending_stiffness": 0.7,
+    "radius": 1.0,
+}
+
+
+def _rod(given: dict[str, Any]) -> Rod:
+    for name in given:
+        checks.choice("rod parameter", name, PAPER)
+    return Rod(**(PAPER | given))
+
+
+def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: float) -> Scene:
+    """The paper's scene: a straight rod at rest, twisted by theta = -pi twist cos(pi s/length), let go.
+
+    `twist` is the number of turns between the two ends, the paper's value 1/2. E(0) = beta pi**4 twist**2/(4 length), which
+    is pi**4/80 for the paper's rod.
+    """
+    rod = _rod(parameters)
+    turns = checks.number("twist", twist)
+    initial = partial(_twisted, length=rod.length, amplitude=np.pi * turns)
+    return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, name="untwisting rod")
+
+
+def rolling_rod(
+    rolling: str = "field",
+    duration: float = 10.0,
+    omega: float = 1.0,
+    mode: int = 1,
+    amplitude: float = 1e-6,
+    **parameters: float,
+) -> Scene:
+    """A straight rod, periodic up to a shift, that rolls sideways at the rate `omega`, slightly perturbed.
+
+    The perturbation is what rolling unevenly from the straight line leaves: theta = amplitude cos(q s),
+    y = R theta, q = 2 pi mode/length.
+    """
+    rod = _rod(parameters)
+    q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
+    initial = partial(
+        _rolling, q=q, radius=rod.radius, omega=checks.number("omega", omega), amplitude=checks.number("amplitude", amplitude)
+    )
+    return Scene(
+        rod=rod,
+        initial=initial,
+        duration=duration,
+        rolling=rolling,
+        closed=True,
+        shift=(rod.length, 0.0),
+        name="rolling rod",
+    )
+
+
+def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float = 0.4, **parameters: float) -> Scene:
+    """A circle of circumference `length`, all discs rolling at the rate `omega`: towards the centre if it is positive."""
+    rod = _rod(parameters)
+    initial = partial(_circle, radius=rod.length / (2 * np.pi), omega=checks.number("omega", omega))
+    return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, closed=True, name="breathing ring")
+
+
+def _twisted(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    return s, 0 * s, -amplitude * np.cos(np.pi * s / length), 0 * s
+
+
+def _rolling(s: NDArray, q: float, radius: float, omega: float, amplitude: float) -> tuple[NDArray, ...]:
+    theta = amplitude * np.cos(q * s)
+    return s, radius * theta, theta, np.full_like(s, omega)
+
+
+def _circle(s: NDArray, radius: float, omega: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    angle = s / radius
+    return radius * np.cos(angle), radius * np.sin(angle), 0 * s, np.full_like(s, omega)
+
+
+SCENES = {f.__name__: f for f in (untwisting_rod, rolling_rod, breathing_ring)}
