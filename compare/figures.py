@@ -29,28 +29,26 @@ def _axes(ax: Axes | None, width: float, height: float) -> Axes:
 
 def save(ax: Axes, path: str | Path) -> None:
     """Save the figure that an axes belongs to."""
-    ax.figure.savefig(path, dpi=150)
+    figure = ax.get_figure(root=True)
+    assert figure is not None  # every axes made here has one
+    figure.savefig(path, dpi=150)
 
 
 def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
     """Error against number of discs, log-log, with slopes 1 and 2 and the field's own error estimate."""
-    ax = _axes(ax, 6.4, 4.8)
+    ax = _axes(ax, 6.8, 5.6)
     for study, colour in zip(studies, (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         for j, (symbol, marker, line) in enumerate(zip(SYMBOL, "os^", ("-", "--", ":"), strict=True)):
             label = f"{LABEL[study.ends]}, {symbol}"
             ax.loglog(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
-    n = np.array([min(s.n[0] for s in studies), max(s.n[-1] for s in studies)], dtype=float)
-    for slope in (1, 2):
-        anchor = max(s.error[0].max() for s in studies) * 1.6
-        ax.loglog(n, anchor * (n / n[0]) ** -slope, color=GREY, linewidth=0.8)
-        middle = np.sqrt(n[0] * n[1])
-        ax.annotate(
-            f"slope {slope}",
-            (middle, anchor * (middle / n[0]) ** -slope),
-            xytext=(2, 4),
-            textcoords="offset points",
-            color=GREY,
-        )
+    # the two slopes, each drawn beside the curves that should follow it
+    for slope, study, beside in ((1, studies[0], 1.7), (2, studies[-1], 0.5)):
+        n = study.n[-3:].astype(float)
+        level = study.error[-1].max() if beside > 1 else study.error[-1].min()
+        line = beside * level * (n / n[-1]) ** -slope
+        offset = (-2, 4 if beside > 1 else -10)
+        ax.loglog(n, line, color=GREY, linewidth=1)
+        ax.annotate(f"slope {slope}", (n[0], line[0]), xytext=offset, textcoords="offset points", color=GREY)
     floor = max(s.floor for s in studies)
     if floor > 0:
         ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label="estimated error of the field")
@@ -62,7 +60,7 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
     ax.set_xlabel("number of discs N")
     ax.set_ylabel("largest error over the discs (length, rad)")
     ax.set_title(f"N discs against the field: {scene.name}, {scene.rolling} law, t = {scene.duration:g}")
-    ax.legend(fontsize=8, ncols=2)
+    ax.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     ax.grid(alpha=0.3, which="major")
     return ax
 
@@ -116,12 +114,14 @@ def _stage(ax: Axes3D, middle: NDArray, reach: float) -> None:
 
 
 def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
-    """Energy against time, all runs in the same axes."""
-    ax = _axes(ax, 7.2, 4.2)
+    """Energy against time, all runs in the same axes; dotted, the modified energy of a run that has one."""
+    ax = _axes(ax, 7.6, 4.6)
     for (label, run), colour in zip(runs.items(), (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         ax.plot(run.t, run.energy, color=colour, label=label, linewidth=1)
+        if run.modified_energy is not None:
+            ax.plot(run.t, run.modified_energy, color=colour, linestyle=":", linewidth=3, label="its modified energy")
     ax.set_xlabel("time t")
     ax.set_ylabel("energy")
-    ax.legend()
+    ax.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     ax.grid(alpha=0.3)
     return ax

@@ -77,7 +77,7 @@ def _twisted(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, NDAr
     return s, 0 * s, -amplitude * np.cos(np.pi * s / length), 0 * s
 
 
-def _rolling(s: NDArray, q: float, radius: float, omega: float, amplitude: float) -> tuple[NDArray, ...]:
+def _rolling(s: NDArray, q: float, radius: float, omega: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     theta = amplitude * np.cos(q * s)
     return s, radius * theta, theta, np.full_like(s, omega)
 

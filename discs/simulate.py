@@ -72,7 +72,7 @@ def simulate(
     before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
     after = np.where(times - before * h > 1e-9 * h, times - before * h, 0.0)
 
-    rows = {name: np.empty((len(times), n)) for name in ("x", "y", "theta", "omega")}
+    rows: dict[str, Any] = {name: np.empty((len(times), n)) for name in ("x", "y", "theta", "omega")}
     rows |= {name: np.empty((len(times), n)) for w in want if w in WANTS for name in WANTS[w]}
     rows |= {name: np.empty(len(times)) for name in ("energy", "rolling_residual")}
     rows |= {name: np.empty(len(times)) for name in want if name in integrator.offers}

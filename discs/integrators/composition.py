@@ -1,6 +1,6 @@
 """Symmetric compositions of midpoint steps: higher order, the same exact energy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from discs.integrators.base import OneStep, Work
@@ -20,7 +20,7 @@ class Suzuki4(OneStep):
     base : the midpoint method that is composed.
     """
 
-    base: Midpoint = Midpoint()
+    base: Midpoint = field(default_factory=Midpoint)
 
     name: ClassVar[str] = "suzuki4"
     order: ClassVar[int] = 4

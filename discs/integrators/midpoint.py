@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from discs import checks
 from discs.integrators.base import OneStep, Work
 from discs.system import Phase, RollingSystem, add
 
@@ -24,11 +25,15 @@ class Midpoint(OneStep):
     H is quadratic and the same C stands in both equations; the step is the midpoint rule, and reversible, when the
     sweeps have converged.
 
+    The matrix has entries up to h^2 K/(M k^4) and costs a solve as many digits. So a sweep solves for the change of p,
+    with the right side pi_n - p - h/2 C^T grad V(q_n + h/2 C p) formed from the links: the digits lost are those of a
+    small change, and the energy keeps 13 to 15 digits where solving for p itself kept 8 to 10.
+
     Parameters
     ----------
     sweeps : the most sweeps in one step.
-    tolerance : a step is converged when C changes by less than this, relative to its largest entry; 0 makes every step
-        take all `sweeps`.
+    tolerance : a step is converged when a sweep changes no move of the step by more than this part of the chain's length
+        (of a radian for theta: this part of as many radians); 0 makes every step take all `sweeps`.
     """
 
     sweeps: int = 50
@@ -40,10 +45,15 @@ class Midpoint(OneStep):
     reference: ClassVar[str] = "Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.2"
     explicit: ClassVar[bool] = False
 
+    def __post_init__(self) -> None:
+        checks.whole("sweeps", self.sweeps, 1)
+        if checks.number("tolerance", self.tolerance) < 0:
+            raise ValueError(f"tolerance must be at least 0; got {self.tolerance!r}")
+
     def step(self, system: RollingSystem, z: Phase, h: float, work: Work) -> Phase:
         d = system.links(z.hi, z.lo)
         p, move = z.pi, 0.5 * h * system.frame(d) * z.pi
-        for sweep in range(1, self.sweeps + 1):
+        for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
             c = system.frame(d + system.increments(move))
             gradient = system.gradient(d + system.increments(0.5 * h * c * p))
             change = system.solve(c, h, z.pi - p - 0.5 * h * (c * gradient).sum(axis=0))
