@@ -1,7 +1,7 @@
 """N discs converge to the rod: lumping, N -> infinity, pictures."""
 
-from compare.convergence import Study, convergence
 from compare.lump import lump
-from compare.overview import overview
+from compare.main_job import overview
+from compare.study import Study, convergence
 
 __all__ = ["Study", "convergence", "lump", "overview"]

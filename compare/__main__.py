@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from compare.overview import SIZES, overview, summary
+from compare.main_job import SIZES, overview, summary
 from continuum import untwisting_rod
 from continuum.files import read_scene
 from discs import SimulationError

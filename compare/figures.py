@@ -15,7 +15,7 @@ from continuum import Scene
 from discs import Solution
 
 if TYPE_CHECKING:
-    from compare.convergence import Study
+    from compare.study import Study
 
 # Okabe and Ito's colours, distinct for colour-blind readers
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
@@ -46,7 +46,7 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
         n = study.n[-3:].astype(float)
         level = study.error[-1].max() if beside > 1 else study.error[-1].min()
         line = beside * level * (n / n[-1]) ** -slope
-        offset = (-2, 4 if beside > 1 else -10)
+        offset = (-2, 4 if beside > 1 else -16)
         ax.loglog(n, line, color=GREY, linewidth=1)
         ax.annotate(f"slope {slope}", (n[0], line[0]), xytext=offset, textcoords="offset points", color=GREY)
     floor = max(s.floor for s in studies)

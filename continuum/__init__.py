@@ -2,6 +2,6 @@
 
 from continuum.rod import Rod, Scene
 from continuum.scenes import breathing_ring, rolling_rod, untwisting_rod
-from continuum.solve import solve
+from continuum.solver import solve
 
 __all__ = ["Rod", "Scene", "breathing_ring", "rolling_rod", "solve", "untwisting_rod"]

@@ -19,6 +19,13 @@ class Ring(NamedTuple):
     omega: NDArray
 
 
+def _collapse(a0: float, inward: float, nu: float) -> float:
+    """First time at which a_0 cos(nu t) - inward sin(nu t)/nu is zero."""
+    if nu > 0:
+        return float(np.arctan2(a0 * nu, inward) / nu)
+    return a0 / inward if inward > 0 else np.inf
+
+
 def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | None = None) -> Ring:
     r"""The circle of circumference `rod.length` whose discs all roll at the rate `omega` at t = 0.
 
@@ -48,11 +55,12 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     r, stiffness = rod.radius, rod.bending_stiffness * b**2
     if rolling == "unit":
         nu = r * np.sqrt(stiffness / rod.inertia)
+        end = _collapse(a0, r * omega, nu)
+        if t[-1] >= end:
+            raise ValueError(f"the ring is a point at t = {end:g}; ask for earlier times")
         # sin(nu t)/nu, which is t for a rod that does not bend
         sine = t * np.sinc(nu * t / np.pi)
         a = a0 * np.cos(nu * t) - r * omega * sine
-        if (a <= 0).any():
-            raise ValueError(f"the ring is a point before t = {t[np.argmax(a <= 0)]:g}; ask for earlier times")
         return Ring(a, (a0 - a) / r, a0 * nu**2 * sine / r + omega * np.cos(nu * t))
 
     def rate(_: float, z: NDArray) -> list[float]:
@@ -61,7 +69,7 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
         force = r * g * a0 * stretch * (rod.density * r**2 * g**2 * z[1] ** 2 / a0**2 + stiffness)
         return [z[1], force / inertia]
 
-    start, end = 0.0, max(float(t[-1]), 1e-300)
-    solution = solve_ivp(rate, (start, end), [0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14)
+    span = 0.0, max(float(t[-1]), 1e-300)
+    solution = solve_ivp(rate, span, [0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14)
     theta, rate_of_roll = solution.y
     return Ring(a0 * np.exp(-r * g * theta / a0), theta, rate_of_roll)

@@ -3,7 +3,7 @@
 from discs.chain import Chain
 from discs.integrators import RK4, Integrator, Leapfrog, Midpoint, Suzuki4
 from discs.problem import Problem, State
-from discs.simulate import SimulationError, simulate, suggest_dt
+from discs.simulation import SimulationError, simulate, suggest_dt
 from discs.solution import Solution
 
 __all__ = [

@@ -1,13 +1,14 @@
 """The main job: one scene, N -> infinity, the motion and the energy."""
 
-from concurrent.futures import ProcessPoolExecutor
+import signal
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
 from compare import figures
-from compare.convergence import COLUMNS, Study, convergence, format_table, write_csv
 from compare.lump import lump
 from compare.outputs import fresh_files
+from compare.study import COLUMNS, Study, checked_sizes, convergence, format_table, write_csv
 from continuum import Scene, solve
 from discs import Solution, simulate
 
@@ -21,33 +22,40 @@ def overview(
 ) -> list[Study]:
     """Compare a scene's discs with its field; write the table and the pictures to `out`.
 
-    Writes convergence.csv, convergence.png, motion.png and energy.png, all of them or none.
+    Writes convergence.csv, convergence.png, motion.png and energy.png, all of them or none. The energy is shown over
+    [0, 150], for a closed rod over the scene's duration (a ring under the unit law does not live longer).
 
     Returns
     -------
     The studies, one for each kind of ends.
     """
     kinds = ("springs",) if scene.closed else ("springs", "consistent")
-    with fresh_files(out) as folder, ProcessPoolExecutor(1, mp_context=get_context("spawn")) as other:
-        energies = other.submit(long_runs, scene)
+    for ends in kinds:
+        checked_sizes(scene, n, ends)
+    long = scene if scene.closed else replace(scene, duration=LONG)
+    # the long runs have a process of their own, which ends with this block whatever happens in it
+    with fresh_files(out) as folder, get_context("spawn").Pool(1, initializer=_leave_interrupts) as other:
+        energies = other.apply_async(energy_runs, (long,))
         field = solve(scene, tol, frames=INSTANTS, progress=progress)
         studies = [convergence(scene, n, ends, field=field, progress=progress) for ends in kinds]
         write_csv(folder / "convergence.csv", studies)
         studies[0].plot(folder / "convergence.png", *studies[1:])
         figures.motion(field, scene).savefig(folder / "motion.png", dpi=150)
-        ax = figures.energy(energies.result())
-        ax.set_title(f"{scene.name}, {scene.rolling} law, energy over [0, {LONG:g}]")
+        ax = figures.energy(energies.get())
+        ax.set_title(f"{scene.name}, {scene.rolling} law, energy over [0, {long.duration:g}]")
         figures.save(ax, folder / "energy.png")
     return studies
 
 
-def long_runs(scene: Scene, n: int = 32) -> dict[str, Solution]:
-    """The scene over [0, 150] by the paper's explicit scheme and by the midpoint method, with n discs and the paper's ends."""
-    long = Scene(**{**vars(scene), "duration": LONG})
-    explicit = solve(long, method="leapfrog", n=n, frames=1001, progress=False)
-    problem = lump(long, n, ends="paper")
-    k = problem.chain.k
-    midpoint = simulate(problem, "midpoint", dt=k / 2, frames=1001, progress=False)
+def _leave_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def energy_runs(scene: Scene, n: int = 32) -> dict[str, Solution]:
+    """A scene by the paper's explicit scheme and by the midpoint method, both with n discs and the paper's ends."""
+    explicit = solve(scene, method="leapfrog", n=n, frames=1001, progress=False)
+    problem = lump(scene, n, ends="paper")
+    midpoint = simulate(problem, "midpoint", dt=problem.chain.k / 2, frames=1001, progress=False)
     return {
         f"the paper's explicit scheme, N = {n}, h = k²/8": explicit,
         f"midpoint, N = {n}, h = k/2": midpoint,

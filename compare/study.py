@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from compare import figures
 from compare.lump import lump
 from continuum import Scene, solve
-from continuum.solve import spline
-from discs import Integrator, Midpoint, Solution, Suzuki4, checks, simulate
+from continuum.solver import spline
+from discs import Integrator, Midpoint, Problem, Solution, Suzuki4, checks, simulate
 
 FIELDS = ("x", "y", "theta")
 TIGHT = Suzuki4(Midpoint(tolerance=1e-10))
@@ -89,10 +89,7 @@ def convergence(
     dt : time step of the chains; None takes the one with which the field met a quarter of its tolerance.
     method : integrator of the chains.
     """
-    sizes = np.atleast_1d(np.asarray(n))
-    if sizes.ndim != 1 or not sizes.size or sizes.dtype.kind not in "iu" or (np.diff(sizes) <= 0).any():
-        raise ValueError(f"n must be increasing whole numbers of discs; got {n!r}")
-    problems = [lump(scene, int(size), ends) for size in sizes]
+    sizes, problems = checked_sizes(scene, n, ends)
     if field is None:
         field = solve(scene, tol, progress=progress)
     h = field.stats["dt"] if dt is None else checks.number("dt", dt, positive=True)
@@ -106,6 +103,14 @@ def convergence(
     floor = max(field.error_estimate[name] for name in FIELDS) if field.error_estimate else 0.0
     k = np.array([problem.chain.k for problem in problems])
     return Study(scene, problems[0].chain.ends, sizes, k, error, floor, h)
+
+
+def checked_sizes(scene: Scene, n: ArrayLike, ends: str) -> tuple[NDArray, list[Problem]]:
+    """The sizes of a study and their problems; ValueError if they are not increasing or too small."""
+    sizes = np.atleast_1d(np.asarray(n))
+    if sizes.ndim != 1 or not sizes.size or sizes.dtype.kind not in "iu" or (np.diff(sizes) <= 0).any():
+        raise ValueError(f"n must be increasing whole numbers of discs; got {n!r}")
+    return sizes, [lump(scene, int(size), ends) for size in sizes]
 
 
 def _periodic(scene: Scene, name: str, run: Solution) -> NDArray:

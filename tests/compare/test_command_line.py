@@ -1,0 +1,78 @@
+"""`python -m compare` as a user meets it."""
+
+import subprocess
+import sys
+
+import pytest
+
+from compare.__main__ import main
+from compare.outputs import fresh_files
+
+FILES = ["convergence.csv", "convergence.png", "energy.png", "motion.png"]
+
+
+def test_main_job(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("compare.main_job.LONG", 5.0)
+    out = tmp_path / "new" / "out"
+    assert main(["--out", str(out), "--n", "9", "17", "--tol", "1e-3", "--quiet"]) == 0
+    assert sorted(p.name for p in out.iterdir()) == FILES
+    printed = capsys.readouterr().out
+    assert "  17  0.250000  " in printed
+    assert (out / "convergence.csv").read_text().startswith("ends,N,k,error x")
+
+
+def test_closed_scene(tmp_path, monkeypatch, capsys):
+    (tmp_path / "ring.toml").write_text('scene = "breathing_ring"\nomega = -0.3\nduration = 0.4\nradius = 0.7\n')
+    out = tmp_path / "out"
+    assert main(["--scene", str(tmp_path / "ring.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-4", "--quiet"]) == 0
+    assert sorted(p.name for p in out.iterdir()) == FILES
+    assert "breathing ring, field law" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--n", "2"], "at least 3"),
+        (["--n", "33", "17"], "increasing whole numbers"),
+        (["--tol", "-1"], "tol must be a positive"),
+        (["--scene", "missing.toml"], "cannot be read"),
+        (["--scene", "a.toml", "--rolling", "unit"], "--rolling belongs to the default scene"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(arguments, message, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main([*arguments, "--out", str(out), "--quiet"]) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err
+    assert printed.err.startswith("error: ")
+    assert printed.err.count("\n") == 1
+    assert not out.exists()
+
+
+def test_unwritable_out(tmp_path, capsys):
+    (tmp_path / "file").write_text("in the way")
+    assert main(["--out", str(tmp_path / "file" / "out"), "--quiet"]) == 2
+    assert "--out must be a folder that can be written to" in capsys.readouterr().err
+    assert main(["--out", str(tmp_path / "file"), "--quiet"]) == 2
+
+
+def test_failure_leaves_old_results(tmp_path):
+    (tmp_path / "table.csv").write_text("old")
+
+    def write(fail):
+        with fresh_files(tmp_path) as folder:
+            (folder / "table.csv").write_text("new")
+            if fail:
+                raise RuntimeError("half way")
+
+    with pytest.raises(RuntimeError, match="half way"):
+        write(fail=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["table.csv"]
+    assert (tmp_path / "table.csv").read_text() == "old"
+    write(fail=False)
+    assert (tmp_path / "table.csv").read_text() == "new"
+
+
+def test_help():
+    run = subprocess.run([sys.executable, "-m", "compare", "--help"], capture_output=True, text=True, check=True)
+    assert "--scene FILE.toml" in run.stdout

@@ -1,0 +1,161 @@
+"""Each integrator: measured order, energy, reversal, constraint."""
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from discs import RK4, Leapfrog, Midpoint, Problem, State, Suzuki4, simulate
+from discs.integrators import METHODS, Work, find
+from discs.system import Phase
+from tests.conftest import uneven
+
+TIGHT = {
+    "midpoint": Midpoint(tolerance=1e-14),
+    "suzuki4": Suzuki4(Midpoint(tolerance=1e-14)),
+    "rk4": RK4(),
+    "leapfrog": Leapfrog(),
+}
+# steps per unit of time, in the asymptotic range of each method and above round-off
+STEPS = {"midpoint": (40, 80, 160), "suzuki4": (20, 40, 80), "rk4": (80, 160, 320), "leapfrog": (160, 320, 640)}
+
+
+def final(problem, method, steps):
+    run = simulate(problem, method, problem.duration / steps, frames=1, progress=False)
+    return np.concatenate([run.x[-1], run.y[-1], run.theta[-1], run.omega[-1]])
+
+
+@cache
+def accurate(kind, rolling):
+    return final(uneven(6, kind, rolling), TIGHT["rk4"], 2000)
+
+
+@pytest.mark.parametrize("kind", ["consistent", "ring"])
+@pytest.mark.parametrize("name", METHODS)
+def test_measured_order_is_the_declared_one(name, kind, rolling):
+    problem = uneven(6, kind, rolling)
+    errors = [np.abs(final(problem, TIGHT[name], steps) - accurate(kind, rolling)).max() for steps in STEPS[name]]
+    orders = np.log2(errors[:-1]) - np.log2(errors[1:])
+    assert orders == pytest.approx(find(name).order, abs=0.25), errors
+
+
+@pytest.mark.parametrize("name", ["midpoint", "suzuki4"])
+def test_energy_is_exact_even_with_one_sweep(name, ends, rolling):
+    loose = Midpoint(sweeps=1, tolerance=0)
+    method = loose if name == "midpoint" else Suzuki4(loose)
+    run = simulate(uneven(9, ends, rolling), method, 0.05, progress=False)
+    np.testing.assert_allclose(run.energy, run.energy[0], rtol=1e-12)
+
+
+def test_energy_test_can_fail(ends, rolling):
+    run = simulate(uneven(9, ends, rolling), "rk4", 0.02, progress=False)
+    assert np.ptp(run.energy) > 1e-9 * run.energy[0]
+
+
+@pytest.mark.parametrize("h", [0.02, 0.2])
+@pytest.mark.parametrize("name", ["midpoint", "suzuki4"])
+def test_reversal(name, h, ends, rolling):
+    """A step back from the end of a step returns to its start."""
+    problem = uneven(9, ends, rolling)
+    z = problem.start()
+    back = z
+    for step in (h, -h):
+        back = TIGHT[name].step(problem.system, back, step, Work())
+    np.testing.assert_allclose(back.hi, z.hi, atol=1e-12)
+    np.testing.assert_allclose(back.pi, z.pi, atol=1e-11)
+    once = Midpoint(sweeps=1, tolerance=0)
+    unconverged = once.step(problem.system, once.step(problem.system, z, h, Work()), -h, Work())
+    assert np.abs(unconverged.hi - z.hi).max() > 1e-9  # a control: one sweep is not reversible
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_rolling_residual_is_round_off_in_every_frame(name, ends, rolling):
+    run = simulate(uneven(9, ends, rolling), name, 0.004, frames=57, progress=False)
+    assert run.rolling_residual.max() < 1e-13
+
+
+def test_midpoint_steps_roll_without_sliding(ends, rolling):
+    """From the frames alone: r_{n+1} - r_n = e(midpoint) (theta_{n+1} - theta_n) over every step."""
+    problem = uneven(9, ends, rolling)
+    run = simulate(problem, TIGHT["midpoint"], 0.05, frames=21, progress=False)
+    q = np.stack([run.x, run.y, run.theta], axis=1)
+    for a, b in pairwise(q):
+        e = problem.system.contact(problem.system.links((a + b) / 2))
+        np.testing.assert_allclose((b - a)[:2], e * (b - a)[2], atol=1e-13)
+
+
+def test_leapfrog_keeps_its_modified_energy(ends, rolling):
+    run = simulate(uneven(9, ends, rolling), "leapfrog", 0.004, want=("modified_energy",), progress=False)
+    np.testing.assert_allclose(run.modified_energy, run.modified_energy[0], rtol=1e-11)
+    assert np.ptp(run.energy) > 1e-8 * run.energy[0]  # which the energy is not
+
+
+def test_leapfrog_is_the_paper_s_scheme():
+    """The residuals of the paper's discrete equations, term by term, with the multipliers eliminated by hand."""
+    n = 9
+    problem = uneven(n, "paper", "field", equal=True)
+    chain, system = problem.chain, problem.system
+    h, k = 0.004, chain.k
+    alpha, beta, rho, bend, radius = (
+        float(np.asarray(getattr(chain, p))[0])
+        for p in ("spin_inertia", "torsion_stiffness", "density", "bending_stiffness", "radius")
+    )
+    memory = TIGHT["leapfrog"].begin(system, problem.start(), h, Work())
+    memory = TIGHT["leapfrog"].advance(system, memory, h, Work())
+    (x0, y0, t0), (x, y, t), (x2, y2, t2) = memory.hi - memory.last, memory.hi, memory.hi + memory.next
+    inner = slice(2, -2)  # where the printed stencils reach
+
+    def fourth(f):
+        return f[4:] - 4 * f[3:-1] + 6 * f[2:-2] - 4 * f[1:-3] + f[:-4]
+
+    def slope(f):
+        return ((f[2:] - f[:-2]) / (2 * k))[1:-1]
+
+    lam = (rho * (x2 - 2 * x + x0)[inner] + h**2 * bend / k**4 * fourth(x)) / h**2
+    mu = (rho * (y2 - 2 * y + y0)[inner] + h**2 * bend / k**4 * fourth(y)) / h**2
+    left = alpha * (t2 - 2 * t + t0)[inner]
+    second = (t[2:] - 2 * t[1:-1] + t[:-2])[1:-1]
+    right = radius * h**2 * (lam * slope(y) - mu * slope(x)) + beta * h**2 / k**2 * second
+    np.testing.assert_allclose(left, right, atol=1e-15)
+    np.testing.assert_allclose((x2 - x0)[inner], -radius * (t2 - t0)[inner] * slope(y), atol=1e-15)
+    np.testing.assert_allclose((y2 - y0)[inner], radius * (t2 - t0)[inner] * slope(x), atol=1e-15)
+
+
+def test_suzuki_fractions():
+    s = np.array(Suzuki4.fractions)
+    assert s.sum() == pytest.approx(1, abs=1e-15)
+    assert (s**3).sum() == pytest.approx(0, abs=1e-15)
+    np.testing.assert_array_equal(s, s[::-1])
+
+
+def moved(state: State, angle: float, shift: tuple[float, float], roll: float) -> State:
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = np.asarray(state.x), np.asarray(state.y)
+    return State(c * x - s * y + shift[0], s * x + c * y + shift[1], np.asarray(state.theta) + roll, state.omega)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_equivariance(name, ends, rolling):
+    """Moving the plane and turning all discs alike moves the motion alike."""
+    problem = uneven(9, ends, rolling)
+    other = Problem(problem.chain, moved(problem.initial, 0.7, (1.3, -2.0), 0.4), problem.duration)
+    a, b = (simulate(p, TIGHT[name], 0.004, frames=1, progress=False) for p in (problem, other))
+    expected = moved(State(a.x[-1], a.y[-1], a.theta[-1], a.omega[-1]), 0.7, (1.3, -2.0), 0.4)
+    for row in ("x", "y", "theta", "omega"):
+        np.testing.assert_allclose(getattr(b, row)[-1], np.asarray(getattr(expected, row)), atol=1e-10)
+
+
+def test_positions_carry_their_low_digits():
+    """Many tiny steps from a large coordinate: without compensation each would lose its low digits."""
+    problem = uneven(9, "consistent", "field")
+    far = Problem(problem.chain, moved(problem.initial, 0.0, (1e6, 0.0), 0.0), 1.0)
+    ends = []
+    for p in (problem, far):
+        z: Phase = p.start()
+        for _ in range(4000):
+            z = RK4().step(p.system, z, 0.00025, Work())
+        ends.append(z)
+    start_rounding = 2 * np.spacing(1e6)  # of the initial data; 4000 uncompensated steps would add about 30 times that
+    moved_by = ends[1].hi[0] - 1e6 - ends[0].hi[0]
+    assert np.abs(moved_by).max() < 40 * start_rounding

@@ -1,0 +1,172 @@
+"""The door: frames, suggestions, refusals, and runs that go wrong."""
+
+import re
+
+import numpy as np
+import pytest
+
+from continuum import breathing_ring, untwisting_rod
+from continuum.mesh import semidiscretise
+from discs import Chain, Midpoint, Problem, SimulationError, State, simulate, suggest_dt
+from discs.integrators import METHODS
+from tests.conftest import uneven
+
+PARAMETERS = {
+    "n": 8,
+    "length": 3.0,
+    "density": 1.2,
+    "spin_inertia": 0.5,
+    "torsion_stiffness": 0.8,
+    "bending_stiffness": 0.6,
+    "radius": 0.7,
+}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_asking_for_frames_does_not_change_the_trajectory(name):
+    problem = uneven(7, "springs", "unit")
+    few, many = (simulate(problem, name, 0.0037, frames=f, progress=False) for f in (2, 57))
+    assert many.t.size == 57
+    assert many.t[-1] == few.t[-1] == problem.duration
+    for row in ("x", "y", "theta", "omega", "energy"):
+        np.testing.assert_array_equal(getattr(few, row)[-1], getattr(many, row)[-1])
+    again = simulate(problem, name, 0.0037, frames=many.t[[5, 56]], progress=False)
+    np.testing.assert_array_equal(again.theta[0], many.theta[5])
+
+
+def test_frames_between_steps_are_as_accurate_as_steps():
+    problem = uneven(7, "springs", "field")
+    times = np.array([0.333, 0.777])
+    fine = simulate(problem, "rk4", 0.0005, frames=times, progress=False)
+    for name in METHODS:
+        run = simulate(problem, name, 0.005, frames=times, progress=False)
+        np.testing.assert_allclose(run.x, fine.x, atol=1e-5)
+    midpoint = simulate(problem, "midpoint", 0.05, frames=times, progress=False)
+    assert midpoint.energy == pytest.approx(problem.energy(), rel=1e-12)
+
+
+def test_wanted_quantities():
+    run = simulate(uneven(7, "consistent", "field"), dt=0.05, want=("velocity", "slope"), frames=3, progress=False)
+    radius = uneven(7, "consistent", "field").chain.radius
+    np.testing.assert_allclose(run.x_rate, -radius * run.slope_y * run.omega, atol=1e-14)
+    np.testing.assert_allclose(run.y_rate, radius * run.slope_x * run.omega, atol=1e-14)
+    assert simulate(uneven(7, "springs", "field"), dt=0.05, progress=False).x_rate is None
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_suggested_step(name):
+    problem = semidiscretise(untwisting_rod(duration=2.0), 33, "springs")
+    run = simulate(problem, name, frames=1, progress=False)
+    fine = simulate(problem, "suzuki4", 0.01, frames=1, progress=False)
+    assert run.stats["dt_suggested"]
+    assert run.stats["dt"] == suggest_dt(problem, name)
+    assert np.abs(run.x - fine.x).max() < 1e-3
+
+
+def test_explicit_step_limit_is_where_it_is_said_to_be():
+    """suggest_dt takes 0.7 of the limit; 1.6 times that is above it, and blows up."""
+    for n in (33, 65):
+        problem = semidiscretise(untwisting_rod(), n, "springs")
+        for name in ("leapfrog", "rk4"):
+            with pytest.raises(SimulationError, match="stability limit"):
+                simulate(problem, name, 1.6 * suggest_dt(problem, name), progress=False)
+
+
+def test_blow_up_names_step_time_disc_and_cause():
+    problem = semidiscretise(untwisting_rod(), 33, "springs")
+    with pytest.raises(
+        SimulationError, match=r"blew up.*dt = 0.02 is above the stability limit of 'rk4'.*step \d+.*disc \d+"
+    ) as caught:
+        simulate(problem, "rk4", 0.02, progress=False)
+    assert caught.value.time == pytest.approx(0.02 * caught.value.step)
+    assert 0 <= caught.value.disc < 33
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.3])
+def test_collapsing_ring_stops_with_time_and_disc(dt):
+    scene = breathing_ring("unit", duration=4.0, omega=0.4)
+    with pytest.raises(SimulationError, match="lost its heading") as caught:
+        simulate(semidiscretise(scene, 24), "midpoint", dt, progress=False)
+    a0, rod = scene.rod.length / (2 * np.pi), scene.rod
+    nu = rod.radius / a0**2 * np.sqrt(rod.bending_stiffness / rod.inertia)
+    collapse = np.arctan(a0 * nu / (rod.radius * 0.4)) / nu
+    assert caught.value.time == pytest.approx(collapse, abs=dt + 0.02)  # 24 discs are late by 0.01
+
+
+def test_rest_stays_at_rest():
+    chain = Chain(**PARAMETERS)
+    run = simulate(Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 5.0), progress=False)
+    assert np.abs(run.y).max() < 1e-14
+
+
+def test_fewer_sweeps_are_counted():
+    run = simulate(uneven(9, "springs", "field"), Midpoint(sweeps=2, tolerance=1e-15), 0.05, frames=1, progress=False)
+    assert run.stats["steps"] == 20
+    assert run.stats["solves"] == 40
+    assert run.stats["unconverged"] == 20
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n": 2}, "at least 3.*got 2"),
+        ({"n": 3, "ends": "consistent"}, "at least 4.*got 3"),
+        ({"n": 4, "ends": "ring"}, "at least 5.*got 4"),
+        ({"n": 8.0}, "whole number.*got 8.0"),
+        ({"length": 0.0}, "length must be a positive finite number; got 0.0"),
+        ({"length": "long"}, "length must be a positive finite number; got 'long'"),
+        ({"density": 0.0}, "density must be finite and greater than 0; got 0.0"),
+        ({"density": np.ones(5)}, r"density must be a number or an array of shape \(8,\); got shape \(5,\)"),
+        ({"radius": -1.0}, "radius must be finite and greater than 0; got -1.0"),
+        ({"spin_inertia": -0.1}, "spin_inertia must be finite and at least 0"),
+        ({"torsion_stiffness": -0.1}, "torsion_stiffness must be finite and at least 0"),
+        ({"bending_stiffness": [1, 1, 1, -2, 1, 1]}, "bending_stiffness must be .* got -2.0 at place 3"),
+        ({"bending_stiffness": np.nan}, "bending_stiffness must be finite"),
+        ({"rolling": "sliding"}, "rolling must be one of 'field', 'unit'; got 'sliding'"),
+        ({"ends": "loose"}, "ends must be one of 'springs', 'consistent', 'paper', 'ring'; got 'loose'"),
+        ({"shift": (1.0, 0.0)}, "shift is the advance of r along a ring"),
+    ],
+)
+def test_bad_chains_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        Chain(**PARAMETERS | change)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"method": "euler"}, "method must be one of 'midpoint', 'suzuki4', 'rk4', 'leapfrog'; got 'euler'"),
+        ({"dt": 0.0}, "dt must be a positive finite number; got 0.0"),
+        ({"dt": -0.1}, "dt must be a positive"),
+        ({"dt": np.nan}, "dt must be a positive"),
+        ({"frames": 0}, "frames must be a whole number of at least 1"),
+        ({"frames": [0.5, 0.2]}, "increasing times within"),
+        ({"frames": [0.5, 1.2]}, "increasing times within"),
+        ({"want": ("colour",)}, "want must be one of 'velocity', 'slope'; got 'colour'"),
+        ({"want": "modified_energy"}, "want must be one of 'velocity', 'slope'; got 'modified_energy'"),
+    ],
+)
+def test_bad_runs_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        simulate(uneven(7, "springs", "field"), progress=False, **arguments)
+
+
+def test_bad_states_and_problems_are_refused():
+    chain = Chain(**PARAMETERS)
+    s = chain.s
+    with pytest.raises(ValueError, match="initial y must be finite; got nan at place 2"):
+        State(s, np.where(np.arange(8) == 2, np.nan, 0.0), 0 * s)
+    with pytest.raises(ValueError, match="initial theta must be a number or an array of shape"):
+        State(s, s, s[:3])
+    with pytest.raises(ValueError, match="initial state must have the chain's 8 discs; got 5"):
+        Problem(chain, State(s[:5], s[:5], s[:5]), 1.0)
+    with pytest.raises(ValueError, match="duration must be a positive finite number; got -1"):
+        Problem(chain, State(s, 0 * s, 0 * s), -1)
+    with pytest.raises(ValueError, match=re.escape("rolling='unit' needs a heading: r' = 0 at disc 0")):
+        Problem(Chain(**PARAMETERS | {"rolling": "unit"}), State(0 * s, 0 * s, 0 * s), 1.0)
+    with pytest.raises(ValueError, match=re.escape("spin_inertia must be positive where r' = 0, as at disc 0; got 0")):
+        Problem(Chain(**PARAMETERS | {"spin_inertia": 0.0}), State(0 * s, 0 * s, 0 * s), 1.0)
+    with pytest.raises(ValueError, match="sweeps must be a whole number of at least 1"):
+        Midpoint(sweeps=0)
+    with pytest.raises(ValueError, match="tolerance must be at least 0"):
+        Midpoint(tolerance=-1.0)
