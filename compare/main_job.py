@@ -1,9 +1,12 @@
 """The main job: one scene, N -> infinity, the motion and the energy."""
 
 import signal
+import threading
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
+
+from tqdm import tqdm
 
 from compare import figures
 from compare.lump import lump
@@ -34,7 +37,7 @@ def overview(
         checked_sizes(scene, n, ends)
     long = scene if scene.closed else replace(scene, duration=LONG)
     # the long runs have a process of their own, which ends with this block whatever happens in it
-    with fresh_files(out) as folder, get_context("spawn").Pool(1, initializer=_leave_interrupts) as other:
+    with fresh_files(out) as folder, get_context("spawn").Pool(1, initializer=_in_the_background) as other:
         energies = other.apply_async(energy_runs, (long,))
         field = solve(scene, tol, frames=INSTANTS, progress=progress)
         studies = [convergence(scene, n, ends, field=field, progress=progress) for ends in kinds]
@@ -47,8 +50,10 @@ def overview(
     return studies
 
 
-def _leave_interrupts() -> None:
+def _in_the_background() -> None:
+    """Leave interrupts to the main process, and lock progress bars within this one (a shared lock would leak)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tqdm.set_lock(threading.RLock())
 
 
 def energy_runs(scene: Scene, n: int = 32) -> dict[str, Solution]:
