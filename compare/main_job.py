@@ -20,9 +20,7 @@ LONG = 150.0
 INSTANTS = 5
 
 
-def overview(
-    scene: Scene, out: str | Path, n: tuple[int, ...] = SIZES, tol: float = 1e-5, progress: bool = True
-) -> list[Study]:
+def overview(scene: Scene, out: str | Path, n: tuple[int, ...] = SIZES, tol: float = 1e-5, progress: bool = True) -> list[Study]:
     """Compare a scene's discs with its field; write the table and the pictures to `out`.
 
     Writes convergence.csv, convergence.png, motion.png and energy.png, all of them or none. The energy is shown over

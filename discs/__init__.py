@@ -1,6 +1,6 @@
 """N rolling discs joined by springs: a finite-dimensional nonholonomic mechanical system."""
 
-from discs.chain import Chain
+from discs.chain import Chain, SteeredChain
 from discs.integrators import RK4, Integrator, Leapfrog, Midpoint, Suzuki4
 from discs.problem import Problem, State
 from discs.simulation import SimulationError, simulate, suggest_dt
@@ -16,6 +16,7 @@ __all__ = [
     "SimulationError",
     "Solution",
     "State",
+    "SteeredChain",
     "Suzuki4",
     "simulate",
     "suggest_dt",

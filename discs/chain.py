@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from discs import checks, stencils
 
 ROLLING = ("field", "unit")
+CURVATURE = ("linear", "true")
 FEWEST = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}
 WHY = {
     "springs": "a bend needs two neighbours",
@@ -17,8 +18,31 @@ WHY = {
 }
 
 
+class Spaced:
+    """Discs at equal spacing along a rod."""
+
+    n: int
+    length: float
+    ends: str
+
+    @property
+    def k(self) -> float:
+        """Spacing of the discs."""
+        return stencils.spacing(self.n, self.length, self.ends)
+
+    @property
+    def s(self) -> NDArray:
+        """Places of the discs along the rod, (n,)."""
+        return self.k * np.arange(self.n)
+
+    @property
+    def w(self) -> NDArray:
+        """Length each disc stands for, (n,)."""
+        return stencils.shares(self.n, self.k, self.ends)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Chain:
+class Chain(Spaced):
     """A chain of `n` vertical discs that roll without sliding, with bending and torsion springs between them.
 
     Disc i stands at s_i = i k on the straight chain and for a share w_i of its length; its mass is rho w_i and its moment
@@ -40,6 +64,9 @@ class Chain:
     bending_stiffness : K >= 0; a number or one per bend, (n-2,), (n,) on a ring and with consistent ends.
     radius : R > 0; a number or (n,).
     rolling : "field" or "unit".
+    curvature : "linear", bending energy K/2 |r''|**2, the paper's; "true", K/2 phi'**2 with phi the direction of the line,
+        which does not see stretch. The ends carry no bend in the true law, whose natural condition is phi' = 0.
+    stretch_stiffness : A >= 0, energy A/2 (|r'| - 1)**2 of links; a number or one per link. Only with the true curvature.
     ends : "springs", "consistent", "paper" (as "springs", end discs of full weight) or "ring".
     shift : r advances by this on one turn of a "ring": (0, 0) closes it, (length, 0) makes a straight periodic rod.
 
@@ -58,41 +85,105 @@ class Chain:
     bending_stiffness: ArrayLike
     radius: ArrayLike
     rolling: str = "field"
+    curvature: str = "linear"
+    stretch_stiffness: ArrayLike = 0.0
     ends: str = "springs"
     shift: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         checks.choice("ends", self.ends, stencils.ENDS)
         checks.choice("rolling", self.rolling, ROLLING)
+        checks.choice("curvature", self.curvature, CURVATURE)
         n = checks.whole(f"n (discs, ends={self.ends!r})", self.n, FEWEST[self.ends], WHY[self.ends])
-        shift = checks.field("shift", self.shift, 2)
-        if self.ends != "ring" and shift.any():
-            raise ValueError(f"shift is the advance of r along a ring; with ends={self.ends!r} it must be (0, 0)")
-        n_links, n_bends = n - (self.ends != "ring"), len(stencils.bend_shares(n, 1.0, self.ends))
-        ranges: dict[str, tuple[int, bool]] = {
-            "density": (n, True),
-            "spin_inertia": (n, False),
-            "torsion_stiffness": (n_links, False),
-            "bending_stiffness": (n_bends, False),
-            "radius": (n, True),
-        }
-        settle = {"n": n, "length": checks.number("length", self.length, positive=True), "shift": tuple(shift.tolist())}
-        for name, (size, strict) in ranges.items():
-            settle[name] = checks.field(name, getattr(self, name), size, least=0.0, strict=strict)
-        for name, value in settle.items():
-            object.__setattr__(self, name, value)
+        links = n - (self.ends != "ring")
+        _settle(
+            self,
+            density=(n, True),
+            spin_inertia=(n, False),
+            torsion_stiffness=(links, False),
+            bending_stiffness=(stencils.bend_shares(n, 1.0, self._bend_ends).size, False),
+            stretch_stiffness=(links, False),
+            radius=(n, True),
+        )
+        if self.curvature == "linear" and np.any(self.stretch_stiffness):
+            raise ValueError("stretch_stiffness goes with curvature='true'; with 'linear' it must be 0")
 
     @property
-    def k(self) -> float:
-        """Spacing of the discs."""
-        return stencils.spacing(self.n, self.length, self.ends)
+    def bend_shares(self) -> NDArray:
+        """Length each bend stands for, (n_bends,)."""
+        return stencils.bend_shares(self.n, self.k, self._bend_ends)
 
     @property
-    def s(self) -> NDArray:
-        """Places of the discs along the rod, (n,)."""
-        return self.k * np.arange(self.n)
+    def _bend_ends(self) -> str:
+        return "springs" if self.curvature == "true" and self.ends == "consistent" else self.ends
 
-    @property
-    def w(self) -> NDArray:
-        """Length each disc stands for, (n,)."""
-        return stencils.shares(self.n, self.k, self.ends)
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SteeredChain(Spaced):
+    """A chain of `n` vertical rolling discs that each have a heading of their own, joined by flexible beams.
+
+    A disc's configuration is (x, y, theta, phi), phi the direction of its axle; it rolls along J (cos phi, sin phi). A link between
+    neighbours resists stretch, shear, torsion and bending; see `discs.steered` for the energy.
+
+    Parameters
+    ----------
+    n : number of discs, at least 2 (5 on a ring).
+    length, density, spin_inertia, torsion_stiffness, bending_stiffness, radius : as for `Chain`; the bending stiffness is
+        per link.
+    heading_inertia : J, moment of inertia about the vertical per length, > 0; a number or one per disc (n,).
+    stretch_stiffness : A >= 0, force per stretch; a number or one per link.
+    shear_stiffness : G >= 0, force per shear angle; a number or one per link.
+    ends : "springs" or "ring".
+    shift : r advances by this on one turn of a "ring".
+    turns : whole turns that the heading makes on one turn of a "ring": 1 for a circle, 0 for a straight periodic rod.
+
+    Raises
+    ------
+    ValueError : for any parameter outside its range.
+    """
+
+    n: int
+    length: float
+    density: ArrayLike
+    spin_inertia: ArrayLike
+    heading_inertia: ArrayLike
+    stretch_stiffness: ArrayLike
+    shear_stiffness: ArrayLike
+    torsion_stiffness: ArrayLike
+    bending_stiffness: ArrayLike
+    radius: ArrayLike
+    ends: str = "springs"
+    shift: tuple[float, float] = (0.0, 0.0)
+    turns: int = 0
+
+    def __post_init__(self) -> None:
+        checks.choice("ends (own headings)", self.ends, ("springs", "ring"))
+        least, why = (5, "a ring's neighbours must differ") if self.ends == "ring" else (2, "a link joins two discs")
+        n = checks.whole(f"n (discs, ends={self.ends!r})", self.n, least, why)
+        links = n - (self.ends != "ring")
+        _settle(
+            self,
+            density=(n, True),
+            spin_inertia=(n, False),
+            heading_inertia=(n, True),
+            stretch_stiffness=(links, False),
+            shear_stiffness=(links, False),
+            torsion_stiffness=(links, False),
+            bending_stiffness=(links, False),
+            radius=(n, True),
+        )
+        if isinstance(self.turns, bool) or not isinstance(self.turns, int):
+            raise ValueError(f"turns must be a whole number; got {self.turns!r}")
+        if self.ends != "ring" and self.turns:
+            raise ValueError(f"turns of the heading are counted around a ring; with ends={self.ends!r} it must be 0")
+
+
+def _settle(chain: "Chain | SteeredChain", **ranges: tuple[int, bool]) -> None:
+    """Check length, shift and the parameters per disc, link or bend (size, must be positive), and store them as arrays."""
+    object.__setattr__(chain, "length", checks.number("length", chain.length, positive=True))
+    shift = checks.field("shift", chain.shift, 2)
+    if chain.ends != "ring" and shift.any():
+        raise ValueError(f"shift is the advance of r along a ring; with ends={chain.ends!r} it must be (0, 0)")
+    object.__setattr__(chain, "shift", tuple(shift.tolist()))
+    for name, (size, strict) in ranges.items():
+        object.__setattr__(chain, name, checks.field(name, getattr(chain, name), size, least=0.0, strict=strict))

@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
-from discs.chain import Chain
-from discs.system import Phase, RollingSystem
+from discs.chain import Chain, SteeredChain
+from discs.slaved import SlavedSystem
+from discs.steered import SteeredSystem
+from discs.system import Phase, SkewGradient
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,17 +22,22 @@ class State:
     x, y : contact points, (n,), length.
     theta : roll angles, (n,), rad.
     omega : rates of roll, (n,), rad per time; a number stands for all.
+    phi : own headings, (n,), rad, for a `SteeredChain`; None for a `Chain`.
+    phi_rate : rates of turning, (n,), rad per time; a number stands for all.
     """
 
     x: ArrayLike
     y: ArrayLike
     theta: ArrayLike
     omega: ArrayLike = 0.0
+    phi: ArrayLike | None = None
+    phi_rate: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
         n = np.size(self.x)
-        for name in ("x", "y", "theta", "omega"):
-            object.__setattr__(self, name, checks.field(f"initial {name}", getattr(self, name), n))
+        for name in ("x", "y", "theta", "omega", "phi", "phi_rate"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, checks.field(f"initial {name}", getattr(self, name), n))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +52,11 @@ class Problem:
 
     Raises
     ------
-    ValueError : if the state has another number of discs, the duration is not positive, or a disc has neither
-        inertia nor a heading to roll along (something would be divided by zero).
+    ValueError : if the state has another number of discs, lacks headings or has too many, the duration is not positive, or a
+        disc has neither inertia nor a heading to roll along (something would be divided by zero).
     """
 
-    chain: Chain
+    chain: Chain | SteeredChain
     initial: State
     duration: float
 
@@ -57,32 +64,44 @@ class Problem:
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
         if np.size(self.initial.x) != self.chain.n:
             raise ValueError(f"initial state must have the chain's {self.chain.n} discs; got {np.size(self.initial.x)}")
-        slope = np.hypot(*self.system.slope(self.system.links(*self._positions())))
-        if self.chain.rolling == "unit" and not slope.all():
+        steered = isinstance(self.chain, SteeredChain)
+        if steered != (self.initial.phi is not None):
+            need = "needs initial headings phi" if steered else "takes its headings from the line: leave phi out"
+            raise ValueError(f"{type(self.chain).__name__} {need}")
+        if isinstance(self.chain, Chain):
+            self._check_slopes(self.chain)
+
+    def _check_slopes(self, chain: Chain) -> None:
+        shape = self.system.shape(self._positions())
+        slope = np.hypot(*self.system.slope(shape))
+        if chain.rolling == "unit" and not slope.all():
             i = int(np.argmin(slope))
             raise ValueError(f"rolling='unit' needs a heading: r' = 0 at disc {i}; move its neighbours apart")
-        inertia = np.asarray(self.chain.spin_inertia) + (slope > 0)
+        if chain.curvature == "true" and not np.hypot(shape[0], shape[1]).all():
+            i = int(np.argmin(np.hypot(shape[0], shape[1])))
+            raise ValueError(f"curvature='true' needs links with a direction: discs {i} and {i + 1} are in one place")
+        inertia = np.asarray(chain.spin_inertia) + (slope > 0)
         if not inertia.all():
             i = int(np.argmin(inertia))
             raise ValueError(f"spin_inertia must be positive where r' = 0, as at disc {i}; got 0")
 
     @cached_property
-    def system(self) -> RollingSystem:
+    def system(self) -> SkewGradient:
         """The equations of motion."""
-        return RollingSystem(self.chain)
+        return SteeredSystem(self.chain) if isinstance(self.chain, SteeredChain) else SlavedSystem(self.chain)
 
-    def _positions(self) -> tuple[NDArray, NDArray]:
-        q = np.array([self.initial.x, self.initial.y, self.initial.theta])
-        return q, np.zeros_like(q)
+    def _positions(self) -> NDArray:
+        return np.array([getattr(self.initial, name) for name in self.system.rows])
 
     def start(self) -> Phase:
         """The initial state in the variables (q, pi) of the skew-gradient form."""
-        hi, lo = self._positions()
-        return Phase(hi, lo, self.system.momentum(self.system.links(hi, lo), np.asarray(self.initial.omega)))
+        q = self._positions()
+        rates = np.array([self.initial.omega, self.initial.phi_rate])
+        return Phase(q, np.zeros_like(q), self.system.momentum(self.system.shape(q), rates))
 
     def energy(self, state: State | None = None) -> float:
         """Kinetic and potential energy of a state, the initial one by default."""
         if state is not None:
             return Problem(self.chain, state, self.duration).energy()
         z = self.start()
-        return 0.5 * float(z.pi @ z.pi) + self.system.potential(self.system.links(z.hi, z.lo))
+        return 0.5 * float(np.vdot(z.pi, z.pi)) + self.system.potential(self.system.shape(z.hi, z.lo))

@@ -15,7 +15,6 @@ from discs.problem import Problem
 from discs.solution import Solution
 
 WANTS = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y")}
-LOST_HEADING = 1e-3
 
 
 class SimulationError(RuntimeError):
@@ -72,26 +71,33 @@ def simulate(
     before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
     after = np.where(times - before * h > 1e-9 * h, times - before * h, 0.0)
 
-    rows: dict[str, Any] = {name: np.empty((len(times), n)) for name in ("x", "y", "theta", "omega")}
+    rows: dict[str, Any] = {name: np.empty((len(times), n)) for name in (*system.rows, "omega")}
     rows |= {name: np.empty((len(times), n)) for w in want if w in WANTS for name in WANTS[w]}
+    if "velocity" in want and "phi" in system.rows:
+        rows["phi_rate"] = np.empty((len(times), n))
     rows |= {name: np.empty(len(times)) for name in ("energy", "rolling_residual")}
-    rows |= {name: np.empty(len(times)) for name in want if name in integrator.offers}
+    offered = [name for name in want if name in integrator.offers]
+    if offered and not system.quadratic:
+        raise ValueError(f"{offered[0]} needs a quadratic potential, which this chain has not")
+    rows |= {name: np.empty(len(times)) for name in offered}
 
     def record(f: int) -> None:
         frame = integrator.at(system, memory, after[f], h)
-        d = system.links(frame.hi, frame.lo)
-        slip = frame.rate[:2] - system.contact(d) * frame.rate[2]
-        rows["x"][f], rows["y"][f], rows["theta"][f] = frame.hi + frame.lo
+        shape = system.shape(frame.hi, frame.lo)
+        slip = frame.rate[:2] - system.contact(shape) * frame.rate[2]
+        for name, values in zip(system.rows, frame.hi + frame.lo, strict=True):
+            rows[name][f] = values
         rows["omega"][f] = frame.rate[2]
-        rows["energy"][f] = system.kinetic(frame.rate) + system.potential(d)
+        rows["energy"][f] = system.kinetic(frame.rate) + system.potential(shape)
         rows["rolling_residual"][f] = np.hypot(*slip).max()
         if "velocity" in want:
             rows["x_rate"][f], rows["y_rate"][f] = frame.rate[:2]
+            if "phi" in system.rows:
+                rows["phi_rate"][f] = frame.rate[3]
         if "slope" in want:
-            rows["slope_x"][f], rows["slope_y"][f] = system.slope(d)
-        for name, value in integrator.extras(system, memory, h).items() if integrator.offers else ():
-            if name in want:
-                rows[name][f] = value
+            rows["slope_x"][f], rows["slope_y"][f] = system.slope(shape)
+        for name, value in integrator.extras(system, memory, h).items() if offered else ():
+            rows[name][f] = value
 
     started = clock.perf_counter()
     work = Work()
@@ -124,7 +130,6 @@ class _Watch:
 
     def __init__(self, problem: Problem, h: float) -> None:
         self.system, self.h = problem.system, h
-        self.unit = problem.chain.rolling == "unit"
         # V >= 0 and H is constant, so the kinetic energy cannot exceed H; far below one unit of twist is rounding
         chain = problem.chain
         rounding = 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
@@ -133,8 +138,15 @@ class _Watch:
     def check(self, integrator: Integrator, previous: Any, memory: Any, step: int) -> None:
         """Raise SimulationError if the step from `previous` to `memory` cannot be trusted."""
         kinetic = integrator.kinetic(self.system, memory, self.h)
-        if self.unit:
-            self._check_heading(previous, memory, step)
+        lost = self.system.lost_heading(previous, memory)
+        if lost is not None:
+            raise SimulationError(
+                "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
+                "end the run earlier, or take a smaller dt if the motion is not resolved",
+                step,
+                step * self.h,
+                lost,
+            )
         if kinetic <= self.bound:
             return
         speed = np.abs(memory.hi[2] - previous.hi[2])
@@ -145,24 +157,6 @@ class _Watch:
             cause = "the step has lost all digits: take a smaller dt, fewer discs or softer springs"
         what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
         raise SimulationError(f"the run blew up, {what}; likely {cause}", step, step * self.h, disc)
-
-    def _check_heading(self, previous: Any, memory: Any, step: int) -> None:
-        """Closest approach of r' to zero on the straight line from one step to the next, for every disc."""
-        a = self.system.slope(self.system.links(previous.hi, previous.lo))
-        b = self.system.slope(self.system.links(memory.hi, memory.lo))
-        move = b - a
-        length = np.maximum((move * move).sum(axis=0), 1e-300)
-        nearest = a + move * np.clip(-(a * move).sum(axis=0) / length, 0.0, 1.0)
-        closest = np.hypot(*nearest)
-        disc = int(np.argmin(closest))
-        if closest[disc] < LOST_HEADING:
-            raise SimulationError(
-                "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
-                "end the run earlier, or take a smaller dt if the motion is not resolved",
-                step,
-                step * self.h,
-                disc,
-            )
 
 
 def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float:
@@ -187,12 +181,16 @@ def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float
 def _stiffest(problem: Problem) -> float:
     """Largest eigenvalue of C^T S C at the initial state."""
     system, z = problem.system, problem.start()
-    c = system.frame(system.links(z.hi, z.lo))
+    shape = system.shape(z.hi, z.lo)
+    c = system.frame(shape)
 
     def apply(p: NDArray) -> NDArray:
-        return (c * system.gradient(system.increments(c * p.ravel()))).sum(axis=0)
+        move = system.forward(c, p.reshape(z.pi.shape))
+        eps = 1e-6 * problem.chain.k / max(float(np.abs(move).max()), 1e-300)
+        force = system.gradient(system.moved(shape, eps * move)) - system.gradient(system.moved(shape, -eps * move))
+        return system.back(c, force).ravel() / (2 * eps)
 
-    n = problem.chain.n
+    n = z.pi.size
     if n < 40:
         return float(np.linalg.eigvalsh(np.array([apply(row) for row in np.eye(n)])).max())
     start = np.random.default_rng(0).standard_normal(n)

@@ -21,7 +21,9 @@ class Solution:
     energy : (F,), kinetic and potential energy.
     rolling_residual : (F,), largest |r. - e omega| over the discs, length per time: zero up to rounding.
     stats : what was done: method, order, dt and where it came from, steps, work, seconds.
+    phi : (F, N), own headings, rad; only of discs that have them.
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
+    phi_rate : (F, N), rates of turning, rad per time; want "velocity", own headings.
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
     error_estimate : for a field, {"x", "y", "theta", "omega"} -> estimated largest error over nodes and frames.
@@ -36,7 +38,9 @@ class Solution:
     energy: NDArray
     rolling_residual: NDArray
     stats: dict[str, Any] = field(default_factory=dict)
+    phi: NDArray | None = None
     x_rate: NDArray | None = None
+    phi_rate: NDArray | None = None
     y_rate: NDArray | None = None
     slope_x: NDArray | None = None
     slope_y: NDArray | None = None

@@ -1,38 +1,31 @@
-r"""The discs as a skew-gradient system, q' = C(q) pi, pi' = -C(q)^T grad V(q).
+r"""What every chain of rolling discs is: a skew-gradient system q' = C(q) pi, pi' = -C(q)^T grad V(q).
 
-Lagrange-d'Alembert for disc i (a dot is d/dt, w its share of length, F = -dV/dr_i, F_theta = -dV/dtheta_i):
+The columns of C span the velocities that rolling allows, scaled so that C^T M C = 1 for the mass matrix M; pi are the rates along
+them. H = |pi|^2/2 + V(q) is constant because the two factors C are each other's transpose, and the constraint holds identically.
+`discs.slaved` and `discs.steered` are the two realisations; the derivations stand there.
 
-    rho w r.. = F + lambda,   alpha w theta.. = F_theta - e.lambda,   r. = e theta.
+A configuration q is an array (rows, n), one row for each coordinate of a disc. All that forces need of it is its *shape*: the
+differences between neighbours, and headings where a disc has its own. Shapes are formed from both parts of the positions.
 
-Eliminating lambda, with r.. = e omega. + e. omega:
-
-    w (alpha + rho |e|^2) omega. + w rho omega e.e. = e.F + F_theta.
-
-Put m = w (alpha + rho |e|^2) and pi = sqrt(m) omega. Then pi. = (m omega. + m. omega/2)/sqrt(m) and m./2 = w rho e.e., so
-
-    (r_i, theta_i). = c_i pi_i,  pi_i. = -c_i . dV/d(r_i, theta_i),  c_i = (e_i, 1)/sqrt(m_i).
-
-H = |pi|^2/2 + V(q) is constant because the two factors C are each other's transpose, and quadratic because V is.
-The rolling constraint holds identically. Arrays are (3, n): rows x, y, theta.
+Energy-exact steps need the mean force between two configurations, a discrete gradient D with D . (q_1 - q_0) = V(q_1) - V(q_0). V
+is half a sum of stiffness times strain squared; if the strains' changes are written as s_1 - s_0 = B (q_1 - q_0) with a
+secant matrix B, then D = B^T (stiffness) (s_0 + s_1)/2 is one.
 """
 
+from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpbsv
-
-from discs import stencils
-from discs.chain import Chain
 
 
 class Phase(NamedTuple):
     """A point of phase space: positions as an unevaluated sum of two doubles, and momenta.
 
-    hi, lo : (3, n), rows x, y, theta; q = hi + lo with lo below half a unit in the last place of hi.
-    pi : (n,), square root of the inertia times the rate of roll.
+    hi, lo : (rows, n); q = hi + lo with lo below half a unit in the last place of hi.
+    pi : (n,), or (2, n) with own headings, rates along the columns of C.
     """
 
     hi: NDArray
@@ -48,140 +41,149 @@ def add(hi: NDArray, lo: NDArray, increment: NDArray) -> tuple[NDArray, NDArray]
     return total, (hi - (total - part)) + (term - part)
 
 
-class RollingSystem:
-    """The equations of motion of a chain whose headings are slaved to its centre line.
+class SkewGradient(ABC):
+    """The equations of motion of a chain.
 
     Attributes
     ----------
-    weights : (3, n), inertia of each disc against x., y., theta.: rho w, rho w, alpha w.
+    n : number of discs.
+    length : of the chain.
+    rows : names of the coordinates of a disc, "x", "y", "theta" and, with own headings, "phi".
+    weights : (rows, n), inertia of each disc against each coordinate's rate.
+    quadratic : whether V is quadratic, so that secants do not depend on the step.
     """
 
-    def __init__(self, chain: Chain) -> None:
-        n, k, ends = chain.n, chain.k, chain.ends
-        self.chain = chain
-        self._ends = ends
-        self._shift = np.array([*chain.shift, 0.0])
-        self._unit = chain.rolling == "unit"
-        self._radius = np.asarray(chain.radius)
-        mass = chain.w * np.asarray(chain.density)
-        self.weights = np.array([mass, mass, chain.w * np.asarray(chain.spin_inertia)])
-        slope = stencils.slope_matrix(n, k, ends)
-        bend = stencils.bend_matrix(n, k, ends)
-        self._slope = sp.csr_array(sp.block_diag([slope, slope]))
-        self._bend = sp.csr_array(sp.block_diag([bend, bend]))
-        self._bend_stiffness = np.tile(np.asarray(chain.bending_stiffness) * stencils.bend_shares(n, k, ends), 2)
-        self._torsion_stiffness = np.asarray(chain.torsion_stiffness) / k
+    n: int
+    length: float
+    rows: tuple[str, ...]
+    weights: NDArray
+    quadratic: bool
 
     # Kinematics
 
-    def links(self, hi: NDArray, lo: NDArray | None = None) -> NDArray:
-        """Differences of neighbours, (3, n_links), from both parts of the positions."""
-        d = stencils.links(hi, self._ends)
-        if lo is not None:
-            d += stencils.links(lo, self._ends)
-        if self._ends == "ring":
-            d[:, -1] += self._shift
-        return d
+    @abstractmethod
+    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Any:
+        """The shape of positions hi + lo."""
 
-    def increments(self, dq: NDArray) -> NDArray:
-        """Change of the links for a change (3, n) of the positions."""
-        return stencils.links(dq, self._ends)
+    @abstractmethod
+    def moved(self, shape: Any, dq: NDArray) -> Any:
+        """The shape after a change dq (rows, n) of the positions."""
 
-    def slope(self, d: NDArray) -> NDArray:
-        """Headings r', (2, n), from links."""
-        return (self._slope @ d[:2].ravel()).reshape(2, -1)
+    @abstractmethod
+    def slope(self, shape: Any) -> NDArray:
+        """The headings: the slope r' of the centre line (slaved), or (cos phi, sin phi); (2, n)."""
 
-    def contact(self, d: NDArray) -> NDArray:
+    @abstractmethod
+    def contact(self, shape: Any) -> NDArray:
         """Contact directions e, (2, n): a disc moves by e per unit of roll. Length per rad."""
-        slope = self.slope(d)
-        e = slope[::-1] * (self._radius / np.hypot(*slope) if self._unit else self._radius)
-        np.negative(e[0], out=e[0])
-        return e
 
-    def inertia(self, e: NDArray) -> NDArray:
-        """Inertia w (alpha + rho |e|**2) of each disc against rolling, (n,)."""
-        return self.weights[2] + self.weights[0] * (e[0] ** 2 + e[1] ** 2)
+    @abstractmethod
+    def frame(self, shape: Any) -> NDArray:
+        """The entries of C, (rows, n)."""
 
-    def frame(self, d: NDArray) -> NDArray:
-        """The columns c_i = (e_i, 1)/sqrt(m_i) of C, as (3, n)."""
-        c = np.empty((3, self.chain.n))
-        c[:2] = self.contact(d)
-        c[2] = 1 / np.sqrt(self.inertia(c[:2]))
-        c[:2] *= c[2]
-        return c
+    @abstractmethod
+    def forward(self, c: NDArray, p: NDArray) -> NDArray:
+        """C p, (rows, n)."""
 
-    def momentum(self, d: NDArray, omega: NDArray) -> NDArray:
-        """pi from the rates of roll."""
-        return np.sqrt(self.inertia(self.contact(d))) * omega
+    @abstractmethod
+    def back(self, c: NDArray, g: NDArray) -> NDArray:
+        """C^T g, of the shape of pi."""
+
+    @abstractmethod
+    def momentum(self, shape: Any, rates: NDArray) -> NDArray:
+        """pi of the rates of roll (row 0) and, with own headings, of turning (row 1)."""
+
+    @abstractmethod
+    def lost_heading(self, before: Phase, after: Phase) -> int | None:
+        """A disc whose heading vanished between two configurations, or None."""
 
     def kinetic(self, v: NDArray) -> float:
-        """Kinetic energy of rates (3, n) of x, y, theta."""
+        """Kinetic energy of rates (rows, n)."""
         return 0.5 * float(np.vdot(v, self.weights * v))
 
     # Springs
 
-    def gradient(self, d: NDArray) -> NDArray:
-        """grad V, (3, n), from links."""
-        tension = np.empty_like(d)
-        tension[:2] = (self._bend_tension @ d[:2].ravel()).reshape(2, -1)
-        tension[2] = self._torsion_stiffness * d[2]
-        return stencils.pull(tension, self._ends)
+    @abstractmethod
+    def potential(self, shape: Any) -> float:
+        """V."""
 
-    def potential(self, d: NDArray, other: NDArray | None = None) -> float:
-        """V of links d; with `other` the symmetric bilinear form of which V is the square, V(d, other)."""
-        other = d if other is None else other
-        bends = self._bend @ d[:2].ravel(), self._bend @ other[:2].ravel()
-        twist = self._torsion_stiffness * d[2] @ other[2]
-        return 0.5 * float((self._bend_stiffness * bends[0]) @ bends[1] + twist)
+    @abstractmethod
+    def secant(self, shape: Any, dq: NDArray) -> Any:
+        """What depends on a step dq (rows, n) from a shape: the mean geometry that `mean_force` and `stiffness` need."""
 
-    @cached_property
-    def _bend_tension(self) -> sp.csr_array:
-        return sp.csr_array(self._bend.T @ sp.diags_array(self._bend_stiffness) @ self._bend)
+    @abstractmethod
+    def mean_force(self, secant: Any) -> NDArray:
+        """The discrete gradient of V over the step, (rows, n); grad V if the step is zero."""
+
+    @abstractmethod
+    def stiffness(self, secant: Any, c: NDArray) -> NDArray:
+        """Upper bands (width + 1, unknowns) of C^T B^T (stiffness) B C, as LAPACK stores them, unknowns in `order`."""
+
+    @abstractmethod
+    def polarised(self, shape: Any, other: Any) -> float:
+        """The symmetric bilinear form of which V is the square; ValueError unless V is quadratic."""
+
+    def gradient(self, shape: Any) -> NDArray:
+        """grad V, (rows, n)."""
+        return self.mean_force(self.secant(shape, np.zeros((len(self.rows), self.n))))
 
     # The linear system of an implicit step
 
-    def solve(self, c: NDArray, h: float, rhs: NDArray) -> NDArray:
-        """Solve (I + h**2/4 C^T S C) p = rhs for p, (n,), where S is the Hessian of V; banded Cholesky, O(n).
-
-        On a ring the discs are taken in the folded order 0, n-1, 1, n-2, ..., in which neighbours are at most two
-        places apart: the matrix is banded there as well.
-        """
-        order, bands = self._bands
-        if order is not None:
-            c, rhs = c[:, order], rhs[order]
-        width, n = bands.shape[0] - 1, c.shape[1]
-        scaled = (0.25 * h * h) * c
-        matrix = np.zeros((width + 1, n), order="F")
-        for j, band in enumerate(bands):
-            matrix[width - j, j:] = (band[:, j:] * scaled[:, j:] * c[:, : n - j]).sum(axis=0)
-        matrix[width] += 1
-        _, p, info = dpbsv(matrix, rhs, overwrite_ab=True)
-        if info:
-            p = np.full(n, np.nan)  # not positive definite: C is not finite, or all digits are lost
-        if order is not None:
-            unfolded = np.empty_like(p)
-            unfolded[order] = p
-            return unfolded
-        return p
+    @property
+    @abstractmethod
+    def order(self) -> NDArray | None:
+        """Order in which the unknowns of pi are taken in banded systems; None as they stand."""
 
     @cached_property
-    def _bands(self) -> tuple[NDArray | None, NDArray]:
-        """Order of the discs (None as they stand) and S in it, (width + 1, 3, n): [j, :, i] couples discs i - j and i."""
-        n = self.chain.n
-        link = stencils.link_matrix(n, self._ends)
-        bending = link.T @ self._bend_tension[: link.shape[0], : link.shape[0]] @ link
-        torsion = link.T @ sp.diags_array(self._torsion_stiffness) @ link
-        hessians = [sp.csr_array(bending), sp.csr_array(torsion)]
-        order = None
-        if self._ends == "ring":
-            order = np.empty(n, dtype=int)
-            order[0::2] = np.arange((n + 1) // 2)
-            order[1::2] = np.arange(n - 1, (n - 1) // 2, -1)
-            hessians = [a[order][:, order] for a in hessians]
-        # nonzero() leaves out springs of no stiffness, and the bands they would fill
-        width = max(int(abs(row - col).max(initial=0)) for row, col in (a.nonzero() for a in hessians))
-        bands = np.zeros((width + 1, 3, n))
-        for j, band in enumerate(bands):
-            band[:2, j:] = hessians[0].diagonal(j)
-            band[2, j:] = hessians[1].diagonal(j)
-        return order, bands
+    def _inverse_order(self) -> NDArray | None:
+        return None if self.order is None else np.argsort(self.order)
+
+    def solve(self, secant: Any, c: NDArray, h: float, rhs: NDArray) -> NDArray:
+        """Solve (I + h**2/4 C^T B^T (stiffness) B C) p = rhs for p, of the shape of pi; banded Cholesky, O(n)."""
+        matrix = self.stiffness(secant, c)
+        matrix *= 0.25 * h * h
+        matrix[-1] += 1
+        flat = rhs.ravel() if self.order is None else rhs.ravel()[self.order]
+        _, p, info = dpbsv(matrix, flat, overwrite_ab=True)
+        if info:
+            p = np.full(flat.size, np.nan)  # not positive definite: C is not finite, or all digits are lost
+        if self._inverse_order is not None:
+            p = p[self._inverse_order]
+        return p.reshape(rhs.shape)
+
+
+class Assembly:
+    """Adds the small matrices of springs up to the bands of one symmetric matrix.
+
+    Parameters
+    ----------
+    places : (springs, m), the places of the unknowns that each spring joins, in the order of the banded system.
+    """
+
+    def __init__(self, *places: NDArray) -> None:
+        self._pairs = [np.triu_indices(p.shape[1]) for p in places]
+        self.size = 1 + max(int(p.max()) for p in places)
+        ends = [np.sort(np.stack([p[:, a], p[:, b]]), axis=0) for p, (a, b) in zip(places, self._pairs, strict=True)]
+        self.width = max(int((high - low).max()) for low, high in ends)
+        self._slots = np.concatenate([((self.width + 1) * high + self.width - (high - low)).ravel() for low, high in ends])
+
+    def __call__(self, *strains: tuple[NDArray, NDArray]) -> NDArray:
+        """Bands of the sum of B^T (stiffness) B, (width + 1, size).
+
+        Each argument belongs to one of `places`: rows B of its strains, (springs, strains, m), and their stiffness,
+        (springs, strains).
+        """
+        entries = []
+        for (b, stiffness), (i, j) in zip(strains, self._pairs, strict=True):
+            local = np.matmul((b * stiffness[:, :, None]).transpose(0, 2, 1), b)
+            entries.append(local[:, i, j].ravel())
+        total = np.bincount(self._slots, np.concatenate(entries), (self.width + 1) * self.size)
+        return total.reshape(self.size, self.width + 1).T
+
+
+def folded(n: int) -> NDArray:
+    """The order 0, n-1, 1, n-2, ... of a ring, in which neighbours are at most two places apart: rings are banded too."""
+    order = np.empty(n, dtype=int)
+    order[0::2] = np.arange((n + 1) // 2)
+    order[1::2] = np.arange(n - 1, (n - 1) // 2, -1)
+    return order

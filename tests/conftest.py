@@ -1,41 +1,70 @@
 """Chains and problems that the tests share: unequal, non-unit parameters, no symmetry."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
-from discs import Chain, Problem, State
-
-BENDS = {"springs": -2, "paper": -2, "consistent": 0, "ring": 0}
+from discs import Chain, Problem, State, SteeredChain
 
 
-def uneven(n: int, ends: str, rolling: str, seed: int = 1, *, equal: bool = False) -> Problem:
+class Model(NamedTuple):
+    """Kind of ends, and of law: "field", "unit", "true" (unit law, true curvature, stretch) or "steered" (own headings)."""
+
+    ends: str
+    law: str
+
+
+SLAVED = [Model(ends, law) for ends in ("springs", "consistent", "paper", "ring") for law in ("field", "unit")]
+TRUE = [Model(ends, "true") for ends in ("springs", "consistent", "ring")]
+STEERED = [Model(ends, "steered") for ends in ("springs", "ring")]
+ALL = SLAVED + TRUE + STEERED
+
+
+def models(kinds: list[Model]):
+    return pytest.mark.parametrize("model", kinds, ids=lambda m: f"{m.law}-{m.ends}")
+
+
+def uneven(n: int, model: Model, seed: int = 1, *, equal: bool = False) -> Problem:
     """A bent, twisted, rolling chain; every disc and spring different unless `equal`."""
     rng = np.random.default_rng(seed)
+    ends, law = model
     links = n - (ends != "ring")
+    bends = n if ends == "ring" or (ends == "consistent" and law != "true") else n - 2
 
     def around(mean: float, size: int):
         return mean if equal else mean * rng.uniform(0.7, 1.4, size)
 
-    chain = Chain(
-        n=n,
-        length=3.1,
-        density=around(1.3, n),
-        spin_inertia=around(0.6, n),
-        torsion_stiffness=around(0.9, links),
-        bending_stiffness=around(0.8, n + BENDS[ends]),
-        radius=around(0.7, n),
-        rolling=rolling,
-        ends=ends,
-    )
-    s = chain.s / chain.length
+    common = {
+        "n": n,
+        "length": 3.1,
+        "density": around(1.3, n),
+        "spin_inertia": around(0.6, n),
+        "torsion_stiffness": around(0.9, links),
+        "bending_stiffness": around(0.8, links if law == "steered" else bends),
+        "radius": around(0.7, n),
+        "ends": ends,
+    }
+    s = np.arange(n) / (n if ends == "ring" else n - 1)
     if ends == "ring":
         turn = 2 * np.pi * s
-        a = chain.length / (2 * np.pi)
+        a = 3.1 / (2 * np.pi)
         x, y = a * (np.cos(turn) + 0.1 * np.cos(2 * turn)), a * (np.sin(turn) - 0.2 * np.cos(turn))
         theta, omega = 0.3 * np.sin(turn) + 0.1 * np.cos(2 * turn), 0.4 + 0.2 * np.cos(turn)
+        heading, turns = turn + np.pi / 2 + 0.2 * np.sin(turn), 1
     else:
-        x, y = chain.length * (s + 0.03 * s**2), chain.length * 0.1 * s**2 * (1 - 0.4 * s)
+        x, y = 3.1 * (s + 0.03 * s**2), 3.1 * 0.1 * s**2 * (1 - 0.4 * s)
         theta, omega = 0.8 * s**2 - 0.5 * s**3, 0.5 - 0.7 * s
+        heading, turns = 0.3 * s**2 - 0.1 * s, 0
+    chain: Chain | SteeredChain
+    if law == "steered":
+        beams = {"stretch_stiffness": around(9.0, links), "shear_stiffness": around(7.0, links)}
+        chain = SteeredChain(**common, **beams, heading_inertia=around(0.3, n), turns=turns)
+        return Problem(chain, State(x, y, theta, omega, heading, 0.3 - 0.4 * s if ends != "ring" else 0.1), 1.0)
+    if law == "true":
+        chain = Chain(**common, rolling="unit", curvature="true", stretch_stiffness=around(5.0, links))
+    else:
+        chain = Chain(**common, rolling=law)
     return Problem(chain, State(x, y, theta, omega), 1.0)
 
 

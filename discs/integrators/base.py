@@ -4,9 +4,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, final
 
+import numpy as np
 from numpy.typing import NDArray
 
-from discs.system import Phase, RollingSystem
+from discs.system import Phase, SkewGradient
 
 
 @dataclass
@@ -26,7 +27,7 @@ class Work:
 
 
 class Frame(NamedTuple):
-    """Positions q = hi + lo and their rates of change, all (3, n), rows x, y, theta."""
+    """Positions q = hi + lo and their rates of change, all (rows, n)."""
 
     hi: NDArray
     lo: NDArray
@@ -53,23 +54,23 @@ class Integrator(ABC):
     offers: ClassVar[tuple[str, ...]]
 
     @abstractmethod
-    def begin(self, system: RollingSystem, z: Phase, h: float, work: Work) -> Any:
+    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Any:
         """What the method must remember between steps of size h, at the first time."""
 
     @abstractmethod
-    def advance(self, system: RollingSystem, memory: Any, h: float, work: Work) -> Any:
+    def advance(self, system: SkewGradient, memory: Any, h: float, work: Work) -> Any:
         """The memory one step h later."""
 
     @abstractmethod
-    def at(self, system: RollingSystem, memory: Any, tau: float, h: float) -> Frame:
+    def at(self, system: SkewGradient, memory: Any, tau: float, h: float) -> Frame:
         """The discs a time 0 <= tau < h after the last step (of size h); the trajectory is not touched."""
 
     @abstractmethod
-    def kinetic(self, system: RollingSystem, memory: Any, h: float) -> float:
+    def kinetic(self, system: SkewGradient, memory: Any, h: float) -> float:
         """Kinetic energy at the last step; for a two-step method, half a step later."""
 
     @abstractmethod
-    def extras(self, system: RollingSystem, memory: Any, h: float) -> dict[str, float]:
+    def extras(self, system: SkewGradient, memory: Any, h: float) -> dict[str, float]:
         """The quantities in `offers`, at the last step."""
 
 
@@ -79,26 +80,26 @@ class OneStep(Integrator):
     offers: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
-    def step(self, system: RollingSystem, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         """One step from z, a pure function of its arguments (work is counted up)."""
 
     @final
-    def begin(self, system: RollingSystem, z: Phase, h: float, work: Work) -> Phase:
+    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         return z
 
     @final
-    def advance(self, system: RollingSystem, memory: Phase, h: float, work: Work) -> Phase:
+    def advance(self, system: SkewGradient, memory: Phase, h: float, work: Work) -> Phase:
         return self.step(system, memory, h, work)
 
     @final
-    def at(self, system: RollingSystem, memory: Phase, tau: float, h: float) -> Frame:
+    def at(self, system: SkewGradient, memory: Phase, tau: float, h: float) -> Frame:
         z = self.step(system, memory, tau, Work()) if tau else memory
-        return Frame(z.hi, z.lo, system.frame(system.links(z.hi, z.lo)) * z.pi)
+        return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
 
     @final
-    def kinetic(self, system: RollingSystem, memory: Phase, h: float) -> float:
-        return 0.5 * float(memory.pi @ memory.pi)
+    def kinetic(self, system: SkewGradient, memory: Phase, h: float) -> float:
+        return 0.5 * float(np.vdot(memory.pi, memory.pi))
 
     @final
-    def extras(self, system: RollingSystem, memory: Phase, h: float) -> dict[str, float]:
+    def extras(self, system: SkewGradient, memory: Phase, h: float) -> dict[str, float]:
         return {}

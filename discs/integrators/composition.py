@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from discs.integrators.base import OneStep, Work
 from discs.integrators.midpoint import Midpoint
-from discs.system import Phase, RollingSystem
+from discs.system import Phase, SkewGradient
 
 SUZUKI = 1 / (4 - 4 ** (1 / 3))
 
@@ -29,7 +29,7 @@ class Suzuki4(OneStep):
     explicit: ClassVar[bool] = False
     fractions: ClassVar[tuple[float, ...]] = (SUZUKI, SUZUKI, 1 - 4 * SUZUKI, SUZUKI, SUZUKI)
 
-    def step(self, system: RollingSystem, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         for fraction in self.fractions:
             z = self.base.step(system, z, fraction * h, work)
         return z

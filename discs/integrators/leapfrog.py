@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from discs.integrators.base import Frame, Integrator, Work
 from discs.integrators.rk4 import RK4
-from discs.system import Phase, RollingSystem, add
+from discs.system import Phase, SkewGradient, add
 
 
 class TwoStep(NamedTuple):
@@ -25,8 +25,9 @@ class Leapfrog(Integrator):
 
     M (q_{n+1} - 2 q_n + q_{n-1})/h^2 = -S q_n + A(q_n)^T lambda,   A(q_n) (q_{n+1} - q_{n-1}) = 0.
 
-    With q* = 2 q_n - q_{n-1} - h^2 M^{-1} S q_n, the admissible move q_{n+1} - q_{n-1} = (e, 1) u of a disc is the
-    projection of q* - q_{n-1}: (alpha + rho |e|^2) u = rho e.(r* - r_{n-1}) + alpha (theta* - theta_{n-1}).
+    With q* = 2 q_n - q_{n-1} - h^2 M^{-1} S q_n, the admissible move is the projection of q* - q_{n-1}, and C^T M C = 1:
+    q_{n+1} - q_{n-1} = C C^T M (q* - q_{n-1}). For a disc, (alpha + rho |e|^2) u = rho e.(r* - r_{n-1}) + alpha (theta* -
+    theta_{n-1}) and a move (e, 1) u.
 
     It conserves |v|^2/2 + V(q_n, q_{n+1}) exactly, v = (q_{n+1} - q_n)/h weighed with the masses and V the bilinear form
     ("modified_energy"): multiply by q_{n+1} - q_{n-1}, which A annihilates. It needs h <= k^2/2 sqrt(rho/K), and carries
@@ -43,37 +44,31 @@ class Leapfrog(Integrator):
     explicit: ClassVar[bool] = True
     offers: ClassVar[tuple[str, ...]] = ("modified_energy",)
 
-    def begin(self, system: RollingSystem, z: Phase, h: float, work: Work) -> TwoStep:
+    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work) -> TwoStep:
         first = RK4().step(system, z, h, work)
         move = (first.hi - z.hi) + (first.lo - z.lo)
-        central = 2 * h * system.frame(system.links(z.hi, z.lo)) * z.pi
+        central = 2 * h * system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi)
         return TwoStep(z.hi, z.lo, central - move, move)
 
-    def advance(self, system: RollingSystem, memory: TwoStep, h: float, work: Work) -> TwoStep:
+    def advance(self, system: SkewGradient, memory: TwoStep, h: float, work: Work) -> TwoStep:
         hi, lo = add(memory.hi, memory.lo, memory.next)
-        d = system.links(hi, lo)
-        e = system.contact(d)
-        gradient = system.gradient(d)
+        shape = system.shape(hi, lo)
+        c = system.frame(shape)
+        free = 2 * system.weights * memory.next - h * h * system.gradient(shape)  # M (q* - q_{n-1})
         work.gradients += 1
-        # the free move from q_{n-1} to q*, times the masses
-        x, y, theta = 2 * system.weights * memory.next - h * h * gradient
-        u = (e[0] * x + e[1] * y + theta) / system.inertia(e)
-        following = -memory.next
-        following[:2] += e * u
-        following[2] += u
-        return TwoStep(hi, lo, memory.next, following)
+        return TwoStep(hi, lo, memory.next, system.forward(c, system.back(c, free)) - memory.next)
 
-    def at(self, system: RollingSystem, memory: TwoStep, tau: float, h: float) -> Frame:
+    def at(self, system: SkewGradient, memory: TwoStep, tau: float, h: float) -> Frame:
         rate = (memory.last + memory.next) / (2 * h)
         if not tau:
             return Frame(memory.hi, memory.lo, rate)
-        z = Phase(memory.hi, memory.lo, rate[2] / system.frame(system.links(memory.hi, memory.lo))[2])
-        return RK4().at(system, z, tau, h)
+        pi = system.back(system.frame(system.shape(memory.hi, memory.lo)), system.weights * rate)
+        return RK4().at(system, Phase(memory.hi, memory.lo, pi), tau, h)
 
-    def kinetic(self, system: RollingSystem, memory: TwoStep, h: float) -> float:
+    def kinetic(self, system: SkewGradient, memory: TwoStep, h: float) -> float:
         return system.kinetic(memory.next / h)
 
-    def extras(self, system: RollingSystem, memory: TwoStep, h: float) -> dict[str, float]:
-        d = system.links(memory.hi, memory.lo)
-        polarised = system.potential(d, d + system.increments(memory.next))
+    def extras(self, system: SkewGradient, memory: TwoStep, h: float) -> dict[str, float]:
+        shape = system.shape(memory.hi, memory.lo)
+        polarised = system.polarised(shape, system.moved(shape, memory.next))
         return {"modified_energy": self.kinetic(system, memory, h) + polarised}

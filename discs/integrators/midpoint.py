@@ -7,7 +7,7 @@ import numpy as np
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.system import Phase, RollingSystem, add
+from discs.system import Phase, SkewGradient, add
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,16 @@ class Midpoint(OneStep):
         if checks.number("tolerance", self.tolerance) < 0:
             raise ValueError(f"tolerance must be at least 0; got {self.tolerance!r}")
 
-    def step(self, system: RollingSystem, z: Phase, h: float, work: Work) -> Phase:
-        d = system.links(z.hi, z.lo)
-        p, move = z.pi, 0.5 * h * system.frame(d) * z.pi
+    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+        shape = system.shape(z.hi, z.lo)
+        p, move = z.pi, 0.5 * h * system.forward(system.frame(shape), z.pi)
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
-            c = system.frame(d + system.increments(move))
-            gradient = system.gradient(d + system.increments(0.5 * h * c * p))
-            change = system.solve(c, h, z.pi - p - 0.5 * h * (c * gradient).sum(axis=0))
+            c = system.frame(system.moved(shape, move))
+            secant = system.secant(shape, h * system.forward(c, p))
+            change = system.solve(secant, c, h, z.pi - p - 0.5 * h * system.back(c, system.mean_force(secant)))
             p = p + change
-            last, move = move, 0.5 * h * c * p
-            if np.abs(move - last).max() <= self.tolerance * system.chain.length:
+            last, move = move, 0.5 * h * system.forward(c, p)
+            if np.abs(move - last).max() <= self.tolerance * system.length:
                 break
         work.gradients += sweep
         work.solves += sweep

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.integrators.base import OneStep, Work
-from discs.system import Phase, RollingSystem, add
+from discs.system import Phase, SkewGradient, add
 
 
 @dataclass(frozen=True)
@@ -21,14 +21,14 @@ class RK4(OneStep):
     reference: ClassVar[str] = "Kutta, Z. Math. Phys. 46 (1901) 435"
     explicit: ClassVar[bool] = True
 
-    def step(self, system: RollingSystem, z: Phase, h: float, work: Work) -> Phase:
-        d = system.links(z.hi, z.lo)
+    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+        shape = system.shape(z.hi, z.lo)
         work.gradients += 4
 
         def rate(dq: NDArray, dpi: NDArray) -> tuple[NDArray, NDArray]:
-            moved = d + system.increments(dq)
+            moved = system.moved(shape, dq)
             c = system.frame(moved)
-            return c * (z.pi + dpi), -(c * system.gradient(moved)).sum(axis=0)
+            return system.forward(c, z.pi + dpi), -system.back(c, system.gradient(moved))
 
         q1, p1 = rate(np.zeros_like(z.hi), np.zeros_like(z.pi))
         q2, p2 = rate(h / 2 * q1, h / 2 * p1)

@@ -48,8 +48,7 @@ def test_field_is_the_limit_of_plain_springs_too(accurate):
     What is left at n = 1025 after removing k and k^2 is 5e-5 to 1.1e-4, where the chain itself is off by 1e-2 to 2e-2.
     """
     runs = [
-        simulate(semidiscretise(untwisting_rod(), n, "springs"), FINE, 0.045, frames=1, progress=False)
-        for n in (257, 513, 1025)
+        simulate(semidiscretise(untwisting_rod(), n, "springs"), FINE, 0.045, frames=1, progress=False) for n in (257, 513, 1025)
     ]
     for name in ("x", "y", "theta"):
         a, b, c = (getattr(run, name)[-1, :: (run.s.size - 1) // 128] for run in runs)

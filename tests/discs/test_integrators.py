@@ -8,7 +8,7 @@ import pytest
 
 from discs import RK4, Chain, Leapfrog, Midpoint, Problem, State, Suzuki4, simulate
 from discs.integrators import METHODS, Work, find
-from tests.conftest import uneven
+from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 
 TIGHT = {
     "midpoint": Midpoint(tolerance=1e-14),
@@ -26,37 +26,47 @@ def final(problem, method, steps):
 
 
 @cache
-def accurate(kind, rolling):
-    return final(uneven(6, kind, rolling), TIGHT["rk4"], 2000)
+def accurate(model):
+    return final(uneven(6, model), TIGHT["rk4"], 2000)
 
 
-@pytest.mark.parametrize("kind", ["consistent", "ring"])
+@models([m for m in ALL if m.ends in ("consistent", "ring")] + STEERED[:1])
 @pytest.mark.parametrize("name", METHODS)
-def test_measured_order_is_the_declared_one(name, kind, rolling):
-    problem = uneven(6, kind, rolling)
-    errors = [np.abs(final(problem, TIGHT[name], steps) - accurate(kind, rolling)).max() for steps in STEPS[name]]
+def test_measured_order_is_the_declared_one(name, model):
+    problem = uneven(6, model)
+    errors = [np.abs(final(problem, TIGHT[name], steps) - accurate(model)).max() for steps in STEPS[name]]
     orders = np.log2(errors[:-1]) - np.log2(errors[1:])
     assert orders == pytest.approx(find(name).order, abs=0.25), errors
 
 
+@models(ALL)
 @pytest.mark.parametrize("name", ["midpoint", "suzuki4"])
-def test_energy_is_exact_even_with_one_sweep(name, ends, rolling):
-    loose = Midpoint(sweeps=1, tolerance=0)
-    method = loose if name == "midpoint" else Suzuki4(loose)
-    run = simulate(uneven(9, ends, rolling), method, 0.05, progress=False)
+def test_energy_is_exact(name, model):
+    run = simulate(uneven(9, model), TIGHT[name], 0.05, progress=False)
     np.testing.assert_allclose(run.energy, run.energy[0], rtol=1e-12)
 
 
-def test_energy_test_can_fail(ends, rolling):
-    run = simulate(uneven(9, ends, rolling), "rk4", 0.02, progress=False)
+@models(SLAVED)
+@pytest.mark.parametrize("name", ["midpoint", "suzuki4"])
+def test_energy_is_exact_even_with_one_sweep(name, model):
+    loose = Midpoint(sweeps=1, tolerance=0)
+    method = loose if name == "midpoint" else Suzuki4(loose)
+    run = simulate(uneven(9, model), method, 0.05, progress=False)
+    np.testing.assert_allclose(run.energy, run.energy[0], rtol=1e-12)
+
+
+@models(ALL)
+def test_energy_test_can_fail(model):
+    run = simulate(uneven(9, model), "rk4", 0.02, progress=False)
     assert np.ptp(run.energy) > 1e-9 * run.energy[0]
 
 
+@models(ALL)
 @pytest.mark.parametrize("h", [0.02, 0.2])
 @pytest.mark.parametrize("name", ["midpoint", "suzuki4"])
-def test_reversal(name, h, ends, rolling):
+def test_reversal(name, h, model):
     """A step back from the end of a step returns to its start."""
-    problem = uneven(9, ends, rolling)
+    problem = uneven(9, model)
     z = problem.start()
     back = z
     for step in (h, -h):
@@ -68,24 +78,27 @@ def test_reversal(name, h, ends, rolling):
     assert np.abs(unconverged.hi - z.hi).max() > 1e-9  # a control: one sweep is not reversible
 
 
+@models(ALL)
 @pytest.mark.parametrize("name", METHODS)
-def test_rolling_residual_is_round_off_in_every_frame(name, ends, rolling):
-    run = simulate(uneven(9, ends, rolling), name, 0.004, frames=57, progress=False)
+def test_rolling_residual_is_round_off_in_every_frame(name, model):
+    run = simulate(uneven(9, model), name, 0.004, frames=57, progress=False)
     assert run.rolling_residual.max() < 1e-13
 
 
-def test_midpoint_steps_roll_without_sliding(ends, rolling):
+@models(ALL)
+def test_midpoint_steps_roll_without_sliding(model):
     """From the frames alone: r_{n+1} - r_n = e(midpoint) (theta_{n+1} - theta_n) over every step."""
-    problem = uneven(9, ends, rolling)
+    problem = uneven(9, model)
     run = simulate(problem, TIGHT["midpoint"], 0.05, frames=21, progress=False)
-    q = np.stack([run.x, run.y, run.theta], axis=1)
+    q = np.stack([getattr(run, row) for row in problem.system.rows], axis=1)
     for a, b in pairwise(q):
-        e = problem.system.contact(problem.system.links((a + b) / 2))
+        e = problem.system.contact(problem.system.shape((a + b) / 2))
         np.testing.assert_allclose((b - a)[:2], e * (b - a)[2], atol=1e-13)
 
 
-def test_leapfrog_keeps_its_modified_energy(ends, rolling):
-    run = simulate(uneven(9, ends, rolling), "leapfrog", 0.004, want=("modified_energy",), progress=False)
+@models(SLAVED)
+def test_leapfrog_keeps_its_modified_energy(model):
+    run = simulate(uneven(9, model), "leapfrog", 0.004, want=("modified_energy",), progress=False)
     np.testing.assert_allclose(run.modified_energy, run.modified_energy[0], rtol=1e-11)
     assert np.ptp(run.energy) > 1e-8 * run.energy[0]  # which the energy is not
 
@@ -93,7 +106,7 @@ def test_leapfrog_keeps_its_modified_energy(ends, rolling):
 def test_leapfrog_is_the_paper_s_scheme():
     """The residuals of the paper's discrete equations, term by term, with the multipliers eliminated by hand."""
     n = 9
-    problem = uneven(n, "paper", "field", equal=True)
+    problem = uneven(n, Model("paper", "field"), equal=True)
     chain, system = problem.chain, problem.system
     h, k = 0.004, chain.k
     alpha, beta, rho, bend, radius = (
@@ -131,17 +144,21 @@ def test_suzuki_fractions():
 def moved(state: State, angle: float, shift: tuple[float, float], roll: float) -> State:
     c, s = np.cos(angle), np.sin(angle)
     x, y = np.asarray(state.x), np.asarray(state.y)
-    return State(c * x - s * y + shift[0], s * x + c * y + shift[1], np.asarray(state.theta) + roll, state.omega)
+    phi = None if state.phi is None else np.asarray(state.phi) + angle
+    turned = c * x - s * y + shift[0], s * x + c * y + shift[1]
+    return State(*turned, np.asarray(state.theta) + roll, state.omega, phi, state.phi_rate)
 
 
+@models(ALL)
 @pytest.mark.parametrize("name", METHODS)
-def test_equivariance(name, ends, rolling):
+def test_equivariance(name, model):
     """Moving the plane and turning all discs alike moves the motion alike."""
-    problem = uneven(9, ends, rolling)
+    problem = uneven(9, model)
     other = Problem(problem.chain, moved(problem.initial, 0.7, (1.3, -2.0), 0.4), problem.duration)
-    a, b = (simulate(p, TIGHT[name], 0.004, frames=1, progress=False) for p in (problem, other))
-    expected = moved(State(a.x[-1], a.y[-1], a.theta[-1], a.omega[-1]), 0.7, (1.3, -2.0), 0.4)
-    for row in ("x", "y", "theta", "omega"):
+    a, b = (simulate(p, TIGHT[name], 0.02, frames=1, progress=False) for p in (problem, other))
+    phi = None if a.phi is None else a.phi[-1]
+    expected = moved(State(a.x[-1], a.y[-1], a.theta[-1], a.omega[-1], phi), 0.7, (1.3, -2.0), 0.4)
+    for row in (*problem.system.rows, "omega"):
         np.testing.assert_allclose(getattr(b, row)[-1], np.asarray(getattr(expected, row)), atol=1e-10)
 
 

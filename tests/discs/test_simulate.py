@@ -7,9 +7,9 @@ import pytest
 
 from continuum import breathing_ring, untwisting_rod
 from continuum.mesh import semidiscretise
-from discs import Chain, Midpoint, Problem, SimulationError, State, simulate, suggest_dt
+from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, simulate, suggest_dt
 from discs.integrators import METHODS
-from tests.conftest import uneven
+from tests.conftest import Model, uneven
 
 PARAMETERS = {
     "n": 8,
@@ -24,7 +24,7 @@ PARAMETERS = {
 
 @pytest.mark.parametrize("name", METHODS)
 def test_asking_for_frames_does_not_change_the_trajectory(name):
-    problem = uneven(7, "springs", "unit")
+    problem = uneven(7, Model("springs", "unit"))
     few, many = (simulate(problem, name, 0.0037, frames=f, progress=False) for f in (2, 57))
     assert many.t.size == 57
     assert many.t[-1] == few.t[-1] == problem.duration
@@ -35,7 +35,7 @@ def test_asking_for_frames_does_not_change_the_trajectory(name):
 
 
 def test_frames_between_steps_are_as_accurate_as_steps():
-    problem = uneven(7, "springs", "field")
+    problem = uneven(7, Model("springs", "field"))
     times = np.array([0.333, 0.777])
     fine = simulate(problem, "rk4", 0.0005, frames=times, progress=False)
     for name in METHODS:
@@ -46,11 +46,11 @@ def test_frames_between_steps_are_as_accurate_as_steps():
 
 
 def test_wanted_quantities():
-    run = simulate(uneven(7, "consistent", "field"), dt=0.05, want=("velocity", "slope"), frames=3, progress=False)
-    radius = uneven(7, "consistent", "field").chain.radius
+    run = simulate(uneven(7, Model("consistent", "field")), dt=0.05, want=("velocity", "slope"), frames=3, progress=False)
+    radius = uneven(7, Model("consistent", "field")).chain.radius
     np.testing.assert_allclose(run.x_rate, -radius * run.slope_y * run.omega, atol=1e-14)
     np.testing.assert_allclose(run.y_rate, radius * run.slope_x * run.omega, atol=1e-14)
-    assert simulate(uneven(7, "springs", "field"), dt=0.05, progress=False).x_rate is None
+    assert simulate(uneven(7, Model("springs", "field")), dt=0.05, progress=False).x_rate is None
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -100,7 +100,7 @@ def test_rest_stays_at_rest():
 
 
 def test_fewer_sweeps_are_counted():
-    run = simulate(uneven(9, "springs", "field"), Midpoint(sweeps=2, tolerance=1e-15), 0.05, frames=1, progress=False)
+    run = simulate(uneven(9, Model("springs", "field")), Midpoint(sweeps=2, tolerance=1e-15), 0.05, frames=1, progress=False)
     assert run.stats["steps"] == 20
     assert run.stats["solves"] == 40
     assert run.stats["unconverged"] == 20
@@ -148,7 +148,7 @@ def test_bad_chains_are_refused(change, message):
 )
 def test_bad_runs_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
-        simulate(uneven(7, "springs", "field"), progress=False, **arguments)
+        simulate(uneven(7, Model("springs", "field")), progress=False, **arguments)
 
 
 def test_bad_states_and_problems_are_refused():
@@ -170,3 +170,49 @@ def test_bad_states_and_problems_are_refused():
         Midpoint(sweeps=0)
     with pytest.raises(ValueError, match="tolerance must be at least 0"):
         Midpoint(tolerance=-1.0)
+
+
+STEERED = PARAMETERS | {"heading_inertia": 0.3, "stretch_stiffness": 5.0, "shear_stiffness": 4.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n": 1}, "at least 2.*a link joins two discs.*got 1"),
+        ({"n": 4, "ends": "ring"}, "at least 5"),
+        ({"ends": "consistent"}, r"ends \(own headings\) must be one of 'springs', 'ring'; got 'consistent'"),
+        ({"heading_inertia": 0.0}, "heading_inertia must be finite and greater than 0; got 0.0"),
+        ({"shear_stiffness": -1.0}, "shear_stiffness must be finite and at least 0"),
+        ({"stretch_stiffness": np.ones(8)}, r"stretch_stiffness must be a number or an array of shape \(7,\)"),
+        ({"turns": 1}, "turns of the heading are counted around a ring"),
+        ({"turns": 0.5, "ends": "ring"}, "turns must be a whole number; got 0.5"),
+    ],
+)
+def test_bad_steered_chains_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        SteeredChain(**STEERED | change)
+
+
+def test_headings_are_given_where_they_belong():
+    steered, slaved = SteeredChain(**STEERED), Chain(**PARAMETERS)
+    s = slaved.s
+    with pytest.raises(ValueError, match="SteeredChain needs initial headings phi"):
+        Problem(steered, State(s, 0 * s, 0 * s), 1.0)
+    with pytest.raises(ValueError, match="Chain takes its headings from the line: leave phi out"):
+        Problem(slaved, State(s, 0 * s, 0 * s, phi=0 * s), 1.0)
+    with pytest.raises(ValueError, match="stretch_stiffness goes with curvature='true'"):
+        Chain(**PARAMETERS | {"stretch_stiffness": 1.0})
+    with pytest.raises(ValueError, match="curvature='true' needs links with a direction: discs 2 and 3 are in one place"):
+        Problem(Chain(**PARAMETERS | {"curvature": "true"}), State(np.where(s > s[2], s - s[1], s), 0 * s, 0 * s), 1.0)
+    with pytest.raises(ValueError, match="modified_energy needs a quadratic potential"):
+        simulate(uneven(7, Model("springs", "steered")), "leapfrog", 0.01, want="modified_energy", progress=False)
+
+
+def test_two_steered_discs():
+    """The smallest chain: a link's torsion and beam between two wheels keeps its energy and its centre by symmetry."""
+    chain = SteeredChain(**STEERED | {"n": 2})
+    run = simulate(Problem(chain, State([0, 3], [0, 0], [-1, 1], phi=[0, 0]), 6.0), dt=0.02, progress=False)
+    assert run.energy == pytest.approx(run.energy[0], rel=1e-12)
+    np.testing.assert_allclose(run.x.sum(axis=1), 3.0, atol=1e-12)
+    np.testing.assert_allclose(run.y.sum(axis=1), 0.0, atol=1e-12)
+    assert np.ptp(run.y) > 0.1

@@ -1,0 +1,191 @@
+r"""Discs with their own heading phi: the chain of N wheels, each the vertical rolling disc of the textbooks.
+
+Disc i (share of length w) has mass rho w, spin inertia alpha w and heading inertia J w, an axle along d_1 = (cos phi, sin phi), and
+rolls along J d_1: r. = e theta. with e = R (-sin phi, cos phi). With |e| = R and F_q = -dV/dq Lagrange-d'Alembert gives
+
+    (alpha + rho R^2) w theta.. = e . F_r + F_theta,   J w phi.. = F_phi,
+
+no term in e.e. = 0: constant inertia, no gyroscopic forces. C has two columns for a disc, (e, 1, 0)/sqrt((alpha + rho R^2) w) and
+(0, 0, 1)/sqrt(J w) in (x, y, theta, phi).
+
+Strains of a link, with d = r_{i+1} - r_i, mean heading m = (phi_i + phi_{i+1})/2 and T(m) the turn by m:
+
+    stretch and shear Gamma = T(-m) d/k - (1, 0),   torsion (theta_{i+1} - theta_i)/k,   bending (phi_{i+1} - phi_i)/k,
+
+V = sum_links k/2 (A Gamma_1^2 + G Gamma_2^2 + beta torsion^2 + K bending^2). Over a step in which d changes by D and m by delta,
+
+    Gamma_1 - Gamma_0 = cos(delta/2) T(-mu) D/k - delta sinc(delta/2) J T(-mu) M/k
+
+exactly, with mu and M the means of m and d: the secant of Gamma in closed form.
+
+Free ends of the limit, the planar Simo-Reissner rod rho r.. = n' + lambda, J phi.. = K phi'' + r' x n, alpha theta.. = beta theta''
+- e.lambda, follow from the admissible variations: K phi' = 0 and e.n + beta theta' = 0.
+"""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs import stencils
+from discs.chain import SteeredChain
+from discs.system import Assembly, Phase, SkewGradient, folded
+
+
+class Links(NamedTuple):
+    """Shape of a steered chain.
+
+    d : (4, n_links), differences of neighbours. middle : (n_links,), mean headings of links. phi : (n,), headings.
+    """
+
+    d: NDArray
+    middle: NDArray
+    phi: NDArray
+
+
+class Section(NamedTuple):
+    """Mean geometry of a step: d Gamma = along @ d(d) + across d(m), and the mean strains.
+
+    along : (2, 2, n_links). across : (2, n_links). strain : (4, n_links): stretch, shear, torsion, bending.
+    """
+
+    along: NDArray
+    across: NDArray
+    strain: NDArray
+
+
+class SteeredSystem(SkewGradient):
+    """The equations of motion of a `SteeredChain`."""
+
+    rows = ("x", "y", "theta", "phi")
+    quadratic = False
+
+    def __init__(self, chain: SteeredChain) -> None:
+        self.n, self.length, self._k, self._ends = chain.n, chain.length, chain.k, chain.ends
+        self._shift = np.array([*chain.shift, 0.0, 2 * np.pi * chain.turns])
+        self._radius = np.asarray(chain.radius)
+        mass, spin, turn = (chain.w * np.asarray(p) for p in (chain.density, chain.spin_inertia, chain.heading_inertia))
+        self.weights = np.array([mass, mass, spin, turn])
+        self._roots = np.sqrt(np.array([spin + mass * self._radius**2, turn]))
+        stiff = chain.stretch_stiffness, chain.shear_stiffness, chain.torsion_stiffness, chain.bending_stiffness
+        self._stiffness = chain.k * np.array(stiff)
+
+    # Kinematics
+
+    def _middle(self, phi: NDArray, close: float) -> NDArray:
+        """Means of neighbours; around a ring the closing one is taken with the turns made."""
+        if self._ends != "ring":
+            return 0.5 * (phi[1:] + phi[:-1])
+        return 0.5 * (phi + np.append(phi[1:], phi[0] + close))
+
+    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Links:
+        d = stencils.links(hi, self._ends)
+        phi = hi[3]
+        if lo is not None:
+            d += stencils.links(lo, self._ends)
+            phi = phi + lo[3]
+        if self._ends == "ring":
+            d[:, -1] += self._shift
+        return Links(d, self._middle(phi, self._shift[3]), phi)
+
+    def moved(self, shape: Links, dq: NDArray) -> Links:
+        d = shape.d + stencils.links(dq, self._ends)
+        return Links(d, shape.middle + self._middle(dq[3], 0.0), shape.phi + dq[3])
+
+    def slope(self, shape: Links) -> NDArray:
+        return np.array([np.cos(shape.phi), np.sin(shape.phi)])
+
+    def contact(self, shape: Links) -> NDArray:
+        return self._radius * np.array([-np.sin(shape.phi), np.cos(shape.phi)])
+
+    def frame(self, shape: Links) -> NDArray:
+        c = np.empty((4, self.n))
+        c[2:] = 1 / self._roots
+        c[:2] = self.contact(shape) * c[2]
+        return c
+
+    def forward(self, c: NDArray, p: NDArray) -> NDArray:
+        q = np.empty((4, self.n))
+        np.multiply(c[:3], p[0], out=q[:3])
+        np.multiply(c[3], p[1], out=q[3])
+        return q
+
+    def back(self, c: NDArray, g: NDArray) -> NDArray:
+        return np.array([(c[:3] * g[:3]).sum(axis=0), c[3] * g[3]])
+
+    def momentum(self, shape: Links, rates: NDArray) -> NDArray:
+        return self._roots * rates
+
+    def lost_heading(self, before: Phase, after: Phase) -> int | None:
+        return None
+
+    # Springs
+
+    def _strain(self, d: NDArray, middle: NDArray) -> NDArray:
+        cos, sin, k = np.cos(middle), np.sin(middle), self._k
+        return np.array([(cos * d[0] + sin * d[1]) / k - 1, (cos * d[1] - sin * d[0]) / k, d[2] / k, d[3] / k])
+
+    def potential(self, shape: Links) -> float:
+        return 0.5 * float((self._stiffness * self._strain(shape.d, shape.middle) ** 2).sum())
+
+    def polarised(self, shape: Links, other: Links) -> float:
+        raise ValueError("V is not quadratic for discs with their own headings")
+
+    def secant(self, shape: Links, dq: NDArray) -> Section:
+        after = self.moved(shape, dq)
+        half = 0.5 * (after.middle - shape.middle)
+        mu = shape.middle + half
+        x, y = 0.5 * (shape.d[:2] + after.d[:2]) / self._k
+        cos, sin = np.cos(mu), np.sin(mu)
+        scale = np.cos(half) / self._k
+        along = np.array([[scale * cos, scale * sin], [-scale * sin, scale * cos]])
+        # -J T(-mu) M/k is (second, -first) component of T(-mu) M/k
+        shorter = np.sinc(half / np.pi)
+        across = np.array([shorter * (cos * y - sin * x), -shorter * (cos * x + sin * y)])
+        strain = 0.5 * (self._strain(shape.d, shape.middle) + self._strain(after.d, after.middle))
+        return Section(along, across, strain)
+
+    def mean_force(self, secant: Section) -> NDArray:
+        stress = self._stiffness * secant.strain
+        tension = np.empty_like(stress)
+        tension[0] = secant.along[0, 0] * stress[0] + secant.along[1, 0] * stress[1]
+        tension[1] = secant.along[0, 1] * stress[0] + secant.along[1, 1] * stress[1]
+        tension[2:] = stress[2:] / self._k
+        force = stencils.pull(tension, self._ends)
+        couple = 0.5 * (secant.across * stress[:2]).sum(axis=0)
+        if self._ends == "ring":
+            force[3] += couple + np.roll(couple, 1)
+        else:
+            force[3, :-1] += couple
+            force[3, 1:] += couple
+        return force
+
+    # The linear system of an implicit step
+
+    @cached_property
+    def order(self) -> NDArray:
+        """Roll and heading of a disc side by side, discs in their (folded) order."""
+        discs = folded(self.n) if self._ends == "ring" else np.arange(self.n)
+        return np.stack([discs, discs + self.n], axis=1).ravel()
+
+    @cached_property
+    def _sides(self) -> tuple[NDArray, NDArray]:
+        first = np.arange(self._stiffness.shape[1])
+        return first, (first + 1) % self.n
+
+    @cached_property
+    def _assembly(self) -> Assembly:
+        place = np.argsort(self.order)
+        first, second = self._sides
+        return Assembly(np.stack([place[first], place[first + self.n], place[second], place[second + self.n]], axis=1))
+
+    def stiffness(self, secant: Section, c: NDArray) -> NDArray:
+        first, second = self._sides
+        b = np.zeros((first.size, 4, 4))
+        for roll, disc, sign in ((0, first, -1.0), (2, second, 1.0)):
+            b[:, :2, roll] = sign * (secant.along * c[:2, disc]).sum(axis=1).T
+            b[:, :2, roll + 1] = (0.5 * secant.across * c[3, disc]).T
+            b[:, 2, roll] = sign / self._k * c[2, disc]
+            b[:, 3, roll + 1] = sign / self._k * c[3, disc]
+        return self._assembly((b, self._stiffness.T))
