@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from compare.background import background
 from compare.main_job import SIZES, overview, summary
 from continuum import untwisting_rod
 from continuum.files import read_scene
@@ -17,7 +18,12 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--scene", metavar="FILE.toml", help="scene to compare; default: the paper's untwisting rod")
     p.add_argument("--rolling", choices=("field", "unit"), help="law of rolling of the default scene (default: field)")
-    p.add_argument("--out", metavar="DIR", default="out", help="folder for the results (default: out)")
+    p.add_argument(
+        "--out",
+        metavar="DIR",
+        default="out",
+        help="folder for the results: table, convergence, motion, energy over 100/3 durations (default: out)",
+    )
     p.add_argument("--n", metavar="N", type=int, nargs="+", default=list(SIZES), help="numbers of discs (default: 17 ... 513)")
     p.add_argument("--tol", metavar="TOL", type=float, default=1e-5, help="largest error of the field (default: 1e-5)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
@@ -31,7 +37,8 @@ def main(arguments: list[str] | None = None) -> int:
         if options.scene and options.rolling:
             raise ValueError("--rolling belongs to the default scene; a scene file says its own law with the key 'rolling'")
         scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
-        studies = overview(scene, options.out, tuple(options.n), options.tol, progress=not options.quiet)
+        with background() as executor:
+            studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor)
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

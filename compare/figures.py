@@ -29,26 +29,27 @@ def _axes(ax: Axes | None, width: float, height: float) -> Axes:
 
 def save(ax: Axes, path: str | Path) -> None:
     """Save the figure that an axes belongs to."""
-    figure = ax.get_figure(root=True)
-    assert figure is not None  # every axes made here has one
-    figure.savefig(path, dpi=150)
+    ax.figure.savefig(path, dpi=150)  # type: ignore[union-attr]
 
 
 def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
     """Error against number of discs, log-log, with slopes 1 and 2 and the field's own error estimate."""
     ax = _axes(ax, 6.8, 5.6)
+    ax.set_xscale("log")
+    if any((s.error > 0).any() for s in studies):
+        ax.set_yscale("log")  # a motion without error, as of a rod at rest, has no logarithm
     for study, colour in zip(studies, (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         for j, (symbol, marker, line) in enumerate(zip(SYMBOL, "os^", ("-", "--", ":"), strict=True)):
             label = f"{LABEL[study.ends]}, {symbol}"
-            ax.loglog(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
+            ax.plot(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
     # the two slopes, each drawn beside the curves that should follow it
-    for slope, study, beside in ((1, studies[0], 1.7), (2, studies[-1], 0.5)):
+    slopes = [(1, s, 1.7) for s in studies if s.ends == "springs"] + [(2, s, 0.5) for s in studies if s.ends != "springs"]
+    for slope, study, beside in slopes:
         n = study.n[-3:].astype(float)
         level = study.error[-1].max() if beside > 1 else study.error[-1].min()
         line = beside * level * (n / n[-1]) ** -slope
-        offset = (-2, 4 if beside > 1 else -16)
-        ax.loglog(n, line, color=GREY, linewidth=1)
-        ax.annotate(f"slope {slope}", (n[0], line[0]), xytext=offset, textcoords="offset points", color=GREY)
+        ax.plot(n, line, color=GREY, linewidth=1)
+        ax.text(n[-1] * 1.06, line[-1], f"slope {slope}", color=GREY, va="center", clip_on=False)
     floor = max(s.floor for s in studies)
     if floor > 0:
         ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label="estimated error of the field")
@@ -74,17 +75,19 @@ def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
     rows = -(-(len(run.t) + 1) // columns)
     figure = Figure(figsize=(4.0 * columns, 3.4 * rows), layout="constrained")
     lines = [np.stack([run.x[f], run.y[f]]) for f in range(len(run.t))]
+    if scene.closed:
+        lines = [np.append(line, line[:, :1] + np.array(scene.shift)[:, None], axis=1) for line in lines]
     everything = np.concatenate(lines, axis=1)
     middle, reach = everything.mean(axis=1), np.ptp(everything, axis=1).max() / 2 * 1.1
     shown = np.unique(np.linspace(0, run.s.size - 1, arrows).round().astype(int))
     for f, (x, y) in enumerate(lines):
         ax: Axes3D = figure.add_subplot(rows, columns, f + 1, projection="3d")
-        tangent = np.gradient(np.stack([x, y]), run.s, axis=1)
+        tangent = np.gradient(np.stack([x, y]), axis=1)[:, : run.s.size]
         tangent /= np.hypot(*tangent)
         sine, cosine = np.sin(run.theta[f]), np.cos(run.theta[f])
         d3 = np.array([-tangent[1] * sine, tangent[0] * sine, cosine])[:, shown]
         ax.plot(x, y, 0, color=BLUE, linewidth=2)
-        ax.quiver(x[shown], y[shown], 0, *(0.6 * d3), color=ORANGE, linewidth=1, arrow_length_ratio=0.25)
+        ax.quiver(x[shown], y[shown], 0, *(0.25 * reach * d3), color=ORANGE, linewidth=1, arrow_length_ratio=0.25)
         _stage(ax, middle, reach)
         ax.set_title(f"t = {run.t[f]:.3g}", y=0.98)
     top: Any = figure.add_subplot(rows, columns, len(lines) + 1)
@@ -95,7 +98,7 @@ def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
     top.set_xlabel("x")
     top.set_ylabel("y")
     top.set_title("centre lines from above")
-    top.legend(fontsize=8)
+    top.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.02, 0.5))
     top.grid(alpha=0.3)
     figure.suptitle(f"{scene.name}, {scene.rolling} law; arrows are the directors d₃")
     return figure
@@ -104,8 +107,8 @@ def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
 def _stage(ax: Axes3D, middle: NDArray, reach: float) -> None:
     ax.set_xlim(middle[0] - reach, middle[0] + reach)
     ax.set_ylim(middle[1] - reach, middle[1] + reach)
-    ax.set_zlim(-0.8, 0.8)
-    ax.set_box_aspect((1, 1, 0.8 / reach), zoom=1.25)
+    ax.set_zlim(-0.3 * reach, 0.3 * reach)
+    ax.set_box_aspect((1, 1, 0.3), zoom=1.2)
     ax.set_zticks([])
     ax.set_xlabel("x")
     ax.set_ylabel("y")

@@ -14,7 +14,7 @@ def fresh_files(out: str | Path) -> Iterator[Path]:
     Raises ValueError at once if `out` cannot be written to.
     """
     target = Path(out)
-    made = not target.exists()
+    made = [p for p in (target, *target.parents) if not p.exists()]
     try:
         target.mkdir(parents=True, exist_ok=True)
         workshop = tempfile.TemporaryDirectory(dir=target, prefix=".partial-")
@@ -23,9 +23,14 @@ def fresh_files(out: str | Path) -> Iterator[Path]:
     try:
         with workshop as folder:
             yield Path(folder)
-            for file in sorted(Path(folder).iterdir()):
+            files = sorted(Path(folder).iterdir())
+            for file in files:
+                if (target / file.name).is_dir():
+                    raise ValueError(f"--out holds a folder where a file is to be written: {target / file.name}")
+            for file in files:
                 os.replace(file, target / file.name)
     except BaseException:
-        if made and not any(target.iterdir()):
-            target.rmdir()
+        for folder_made in made:
+            if not any(folder_made.iterdir()):
+                folder_made.rmdir()
         raise

@@ -46,12 +46,12 @@ class Study:
     @property
     def order(self) -> NDArray:
         """Measured order between neighbouring rows, (S - 1, 3): log of the ratio of errors over log of that of spacings."""
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
 
     def rows(self) -> list[tuple[str, ...]]:
         """The table as text, a row for each n; see COLUMNS."""
-        orders = [("", "", "")] + [tuple(f"{o:.2f}" for o in row) for row in self.order]
+        orders = [("", "", "")] + [tuple(f"{o:.2f}" if np.isfinite(o) else "-" for o in row) for row in self.order]
         return [
             (self.ends, str(n), f"{k:.6f}", *(f"{e:.3e}" for e in error), *order)
             for n, k, error, order in zip(self.n, self.k, self.error, orders, strict=True)
@@ -85,13 +85,17 @@ def convergence(
     ----------
     n : numbers of discs, increasing, at least one.
     ends : see `lump`.
-    field : the field's solution, solved to `tol` if not given; its last frame counts.
-    dt : time step of the chains; None takes the one with which the field met a quarter of its tolerance.
+    field : the scene's `solve(scene, tol)`, computed if not given; its last frame, at the end of the scene, counts.
+    dt : time step of the chains; None takes that of the field, whose effect is part of its error estimate.
     method : integrator of the chains.
     """
     sizes, problems = checked_sizes(scene, n, ends)
     if field is None:
         field = solve(scene, tol, progress=progress)
+    if field.error_estimate is None or not np.isclose(field.t[-1], scene.duration, rtol=1e-12):
+        raise ValueError(
+            f"field must be solve(scene, tol) of this scene up to t = {scene.duration:g}, with an error estimate; got {field!r}"
+        )
     h = field.stats["dt"] if dt is None else checks.number("dt", dt, positive=True)
     limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in FIELDS}
     error = np.empty((len(problems), len(FIELDS)))
@@ -100,7 +104,7 @@ def convergence(
         run = simulate(problem, method, h, frames=1, progress=False)
         for j, name in enumerate(FIELDS):
             error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
-    floor = max(field.error_estimate[name] for name in FIELDS) if field.error_estimate else 0.0
+    floor = max(field.error_estimate[name] for name in FIELDS)
     k = np.array([problem.chain.k for problem in problems])
     return Study(scene, problems[0].chain.ends, sizes, k, error, floor, h)
 

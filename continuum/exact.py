@@ -48,6 +48,11 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     """
     checks.choice("rolling", rolling, ROLLING)
     t = np.atleast_1d(np.asarray(t, dtype=float))
+    if not t.size or not np.isfinite(t).all() or t[0] < 0 or (np.diff(t) <= 0).any():
+        raise ValueError(f"t must be increasing times from 0 on; got {t}")
+    omega = checks.number("omega", omega)
+    if n is not None:
+        n = checks.whole("n (discs of a ring)", n, 5)
     a0 = rod.length / (2 * np.pi)
     k = rod.length if n is None else rod.length / n
     g = 1.0 if n is None else a0 / k * np.sin(2 * np.pi / n)

@@ -4,7 +4,7 @@ from continuum.rod import Scene
 from discs import Chain, Problem, State, checks, stencils
 
 
-def semidiscretise(scene: Scene, n: int, ends: str = "consistent") -> Problem:
+def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     """The field equations of a scene on n nodes, as the problem of n discs that they are.
 
     A node with its share of length is a disc, a finite difference of the potential is a spring: with the stencils of
@@ -32,4 +32,7 @@ def semidiscretise(scene: Scene, n: int, ends: str = "consistent") -> Problem:
         ends="ring" if scene.closed else ends,
         shift=scene.shift,
     )
-    return Problem(chain, State(*scene.initial(chain.s)), scene.duration)
+    fields = scene.initial(chain.s)
+    if not isinstance(fields, tuple) or len(fields) != 4:
+        raise ValueError(f"the scene's initial fields must be x, y, theta and omega; got {type(fields).__name__} {fields!r:.60}")
+    return Problem(chain, State(*fields), scene.duration)

@@ -82,6 +82,10 @@ class Scene:
     name: str = "scene"
 
     def __post_init__(self) -> None:
+        if not isinstance(self.rod, Rod) or not callable(self.initial):
+            raise ValueError(f"a scene needs a Rod and a function of s; got {self.rod!r} and {self.initial!r}")
+        if not isinstance(self.closed, bool):
+            raise ValueError(f"closed must be True or False; got {self.closed!r}")
         checks.choice("rolling", self.rolling, ROLLING)
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
         shift = checks.field("shift", self.shift, 2)

@@ -34,7 +34,7 @@ class State:
     phi_rate: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
-        n = np.size(self.x)
+        n = max(np.size(v) for v in (self.x, self.y, self.theta, self.omega) if v is not None)
         for name in ("x", "y", "theta", "omega", "phi", "phi_rate"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, checks.field(f"initial {name}", getattr(self, name), n))

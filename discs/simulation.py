@@ -27,7 +27,10 @@ class SimulationError(RuntimeError):
 
     def __init__(self, message: str, step: int, time: float, disc: int) -> None:
         super().__init__(f"{message} (step {step}, time {time:g}, disc {disc})")
-        self.step, self.time, self.disc = step, time, disc
+        self.message, self.step, self.time, self.disc = message, step, time, disc
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.message, self.step, self.time, self.disc)
 
 
 def simulate(
@@ -61,6 +64,8 @@ def simulate(
     SimulationError : as soon as the kinetic energy exceeds ten times the total energy of the start, which no exact
         motion does, something is not finite, or (rolling="unit") a disc loses its heading.
     """
+    if not isinstance(problem, Problem):
+        raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
     integrator = find(method)
     want = _wanted(want, integrator)
     suggested = dt is None
@@ -82,7 +87,9 @@ def simulate(
     rows |= {name: np.empty(len(times)) for name in offered}
 
     def record(f: int) -> None:
-        frame = integrator.at(system, memory, after[f], h)
+        frame = integrator.at(system, memory, after[f], h, work)
+        if after[f]:
+            watch.check(system.kinetic(frame.rate), memory, frame, step, times[f])
         shape = system.shape(frame.hi, frame.lo)
         slip = frame.rate[:2] - system.contact(shape) * frame.rate[2]
         for name, values in zip(system.rows, frame.hi + frame.lo, strict=True):
@@ -101,7 +108,7 @@ def simulate(
 
     started = clock.perf_counter()
     work = Work()
-    watch = _Watch(problem, h)
+    watch = _Watch(problem, integrator, h)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         memory: Any = integrator.begin(system, problem.start(), h, work)
         step = 0
@@ -111,7 +118,7 @@ def simulate(
                     previous, memory = memory, integrator.advance(system, memory, h, work)
                     step += 1
                     bar.update()
-                    watch.check(integrator, previous, memory, step)
+                    watch.check(integrator.kinetic(system, memory, h), previous, memory, step, step * h)
                 record(f)
     stats = {
         "method": integrator.name,
@@ -128,54 +135,54 @@ def simulate(
 class _Watch:
     """Stops a run that has gone wrong, and says where and why."""
 
-    def __init__(self, problem: Problem, h: float) -> None:
-        self.system, self.h = problem.system, h
+    def __init__(self, problem: Problem, integrator: Integrator, h: float) -> None:
+        self.system, self.integrator, self.h = problem.system, integrator, h
         # V >= 0 and H is constant, so the kinetic energy cannot exceed H; far below one unit of twist is rounding
         chain = problem.chain
         rounding = 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
         self.bound = 10 * problem.energy() + rounding
 
-    def check(self, integrator: Integrator, previous: Any, memory: Any, step: int) -> None:
-        """Raise SimulationError if the step from `previous` to `memory` cannot be trusted."""
-        kinetic = integrator.kinetic(self.system, memory, self.h)
+    def check(self, kinetic: float, previous: Any, memory: Any, step: int, time: float) -> None:
+        """Raise SimulationError if the way from `previous` to `memory` (positions hi + lo) cannot be trusted."""
         lost = self.system.lost_heading(previous, memory)
         if lost is not None:
             raise SimulationError(
                 "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
                 "end the run earlier, or take a smaller dt if the motion is not resolved",
                 step,
-                step * self.h,
+                time,
                 lost,
             )
         if kinetic <= self.bound:
             return
         speed = np.abs(memory.hi[2] - previous.hi[2])
         disc = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
-        if integrator.explicit:
-            cause = f"dt = {self.h:g} is above the stability limit of {integrator.name!r}: take a smaller dt or 'midpoint'"
+        if np.isfinite(self.integrator.stability_limit):
+            name = self.integrator.name
+            cause = f"dt = {self.h:g} is above the stability limit of {name!r}: take a smaller dt or 'midpoint'"
         else:
             cause = "the step has lost all digits: take a smaller dt, fewer discs or softer springs"
         what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
-        raise SimulationError(f"the run blew up, {what}; likely {cause}", step, step * self.h, disc)
+        raise SimulationError(f"the run blew up, {what}; likely {cause}", step, time, disc)
 
 
 def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float:
     """A step for a method: accurate to about 1e-3 for smooth motion if implicit, 0.7 of the stability limit if explicit.
 
     Implicit: half the time a torsion wave takes from disc to disc, at most a hundredth of the duration.
-    Explicit: the limit is 2/Omega (two-step) or 2.8/Omega (rk4), Omega^2 the largest eigenvalue of C^T S C at the start;
-    0.7 leaves room for headings that grow.
+    Explicit: the limit is the method's over Omega, Omega^2 the largest eigenvalue of C^T S C at the start; 0.7 leaves room for
+    headings that grow.
     """
     integrator = find(method)
     chain = problem.chain
-    if not integrator.explicit:
+    if not np.isfinite(integrator.stability_limit):
         stiffest = np.max(chain.torsion_stiffness)
         least = np.min(np.asarray(chain.spin_inertia) + np.asarray(chain.density) * np.asarray(chain.radius) ** 2)
         wave = chain.k * np.sqrt(least / stiffest) if stiffest > 0 else np.inf
         return float(min(0.5 * wave, problem.duration / 100))
     omega = np.sqrt(_stiffest(problem))
-    limit = 2.0 if integrator.name == "leapfrog" else 2.8
-    return float(min(0.7 * limit / omega if omega > 0 else np.inf, problem.duration / 100))
+    limit = integrator.stability_limit / omega if omega > 0 else np.inf
+    return float(min(0.7 * limit, problem.duration / 100))
 
 
 def _stiffest(problem: Problem) -> float:
@@ -199,6 +206,8 @@ def _stiffest(problem: Problem) -> float:
 
 
 def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:
+    if not isinstance(want, Iterable):
+        raise ValueError(f"want must be names of quantities; got {want!r}")
     given = (want,) if isinstance(want, str) else tuple(want)
     return tuple(checks.choice("want", name, (*WANTS, *integrator.offers)) for name in given)
 
@@ -207,7 +216,10 @@ def _frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
     if np.ndim(frames) == 0:
         count = checks.whole("frames", frames, 1, "the last state is always one")
         return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])
-    times = np.asarray(frames, dtype=float)
+    try:
+        times = np.asarray(frames, dtype=float)
+    except (TypeError, ValueError):
+        times = np.array([np.nan])
     inside = np.isfinite(times).all() and times.ndim == 1 and times.size and times[0] >= 0 and times[-1] <= duration
     if not inside or (np.diff(times) <= 0).any():
         raise ValueError(f"frames must be increasing times within [0, {duration:g}], or their number; got {frames!r}")

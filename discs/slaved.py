@@ -52,7 +52,8 @@ class SlavedSystem(SkewGradient):
 
     def __init__(self, chain: Chain) -> None:
         n, k, ends = chain.n, chain.k, chain.ends
-        self.n, self.length, self._k, self._ends = n, chain.length, k, ends
+        self.n, self._k, self._ends = n, k, ends
+        self.scale = np.array([chain.length, chain.length, 1.0])
         self.quadratic = chain.curvature == "linear"
         self._shift = np.array([*chain.shift, 0.0])
         self._unit = chain.rolling == "unit"

@@ -19,7 +19,9 @@ class Solution:
     theta : (F, N), roll angles, rad.
     omega : (F, N), rates of roll, rad per time.
     energy : (F,), kinetic and potential energy.
-    rolling_residual : (F,), largest |r. - e omega| over the discs, length per time: zero up to rounding.
+    rolling_residual : (F,), largest |r. - e omega| over the discs, length per time, of the method's own velocities: zero up to
+        rounding. (Methods in (q, pi) form r. from e omega; that their steps roll is |r_{n+1} - r_n - e (theta_{n+1} - theta_n)| = 0
+        with e at the midpoint.) None for an extrapolated field.
     stats : what was done: method, order, dt and where it came from, steps, work, seconds.
     phi : (F, N), own headings, rad; only of discs that have them.
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
@@ -36,7 +38,7 @@ class Solution:
     theta: NDArray
     omega: NDArray
     energy: NDArray
-    rolling_residual: NDArray
+    rolling_residual: NDArray | None = None
     stats: dict[str, Any] = field(default_factory=dict)
     phi: NDArray | None = None
     x_rate: NDArray | None = None

@@ -62,7 +62,8 @@ class SteeredSystem(SkewGradient):
     quadratic = False
 
     def __init__(self, chain: SteeredChain) -> None:
-        self.n, self.length, self._k, self._ends = chain.n, chain.length, chain.k, chain.ends
+        self.n, self._k, self._ends = chain.n, chain.k, chain.ends
+        self.scale = np.array([chain.length, chain.length, 1.0, 1.0])
         self._shift = np.array([*chain.shift, 0.0, 2 * np.pi * chain.turns])
         self._radius = np.asarray(chain.radius)
         mass, spin, turn = (chain.w * np.asarray(p) for p in (chain.density, chain.spin_inertia, chain.heading_inertia))

@@ -47,14 +47,14 @@ class SkewGradient(ABC):
     Attributes
     ----------
     n : number of discs.
-    length : of the chain.
+    scale : (rows,), the size of a motion: the chain's length, and a radian.
     rows : names of the coordinates of a disc, "x", "y", "theta" and, with own headings, "phi".
     weights : (rows, n), inertia of each disc against each coordinate's rate.
     quadratic : whether V is quadratic, so that secants do not depend on the step.
     """
 
     n: int
-    length: float
+    scale: NDArray
     rows: tuple[str, ...]
     weights: NDArray
     quadratic: bool

@@ -43,6 +43,7 @@ class Integrator(ABC):
     order : declared order in the step; the tests measure it.
     preserves : what it keeps, in words.
     reference : where it comes from.
+    stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
     offers : names of extra quantities it can report per frame, see `extras`.
     """
 
@@ -50,7 +51,7 @@ class Integrator(ABC):
     order: ClassVar[int]
     preserves: ClassVar[str]
     reference: ClassVar[str]
-    explicit: ClassVar[bool]
+    stability_limit: ClassVar[float]
     offers: ClassVar[tuple[str, ...]]
 
     @abstractmethod
@@ -62,7 +63,7 @@ class Integrator(ABC):
         """The memory one step h later."""
 
     @abstractmethod
-    def at(self, system: SkewGradient, memory: Any, tau: float, h: float) -> Frame:
+    def at(self, system: SkewGradient, memory: Any, tau: float, h: float, work: Work) -> Frame:
         """The discs a time 0 <= tau < h after the last step (of size h); the trajectory is not touched."""
 
     @abstractmethod
@@ -92,8 +93,8 @@ class OneStep(Integrator):
         return self.step(system, memory, h, work)
 
     @final
-    def at(self, system: SkewGradient, memory: Phase, tau: float, h: float) -> Frame:
-        z = self.step(system, memory, tau, Work()) if tau else memory
+    def at(self, system: SkewGradient, memory: Phase, tau: float, h: float, work: Work) -> Frame:
+        z = self.step(system, memory, tau, work) if tau else memory
         return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
 
     @final

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+
 from discs.integrators.base import OneStep, Work
 from discs.integrators.midpoint import Midpoint
 from discs.system import Phase, SkewGradient
@@ -26,8 +28,12 @@ class Suzuki4(OneStep):
     order: ClassVar[int] = 4
     preserves: ClassVar[str] = Midpoint.preserves
     reference: ClassVar[str] = "Suzuki, Phys. Lett. A 146 (1990) 319"
-    explicit: ClassVar[bool] = False
+    stability_limit: ClassVar[float] = np.inf
     fractions: ClassVar[tuple[float, ...]] = (SUZUKI, SUZUKI, 1 - 4 * SUZUKI, SUZUKI, SUZUKI)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.base, Midpoint):
+            raise ValueError(f"base must be a Midpoint; got {self.base!r}")
 
     def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         for fraction in self.fractions:

@@ -41,7 +41,7 @@ class Leapfrog(Integrator):
     order: ClassVar[int] = 2
     preserves: ClassVar[str] = "a modified energy exactly; the rolling constraint of the central differences"
     reference: ClassVar[str] = "Vankerschaver, A class of nonholonomic kinematic constraints in elasticity, section 4.3"
-    explicit: ClassVar[bool] = True
+    stability_limit: ClassVar[float] = 2.0
     offers: ClassVar[tuple[str, ...]] = ("modified_energy",)
 
     def begin(self, system: SkewGradient, z: Phase, h: float, work: Work) -> TwoStep:
@@ -58,12 +58,12 @@ class Leapfrog(Integrator):
         work.gradients += 1
         return TwoStep(hi, lo, memory.next, system.forward(c, system.back(c, free)) - memory.next)
 
-    def at(self, system: SkewGradient, memory: TwoStep, tau: float, h: float) -> Frame:
+    def at(self, system: SkewGradient, memory: TwoStep, tau: float, h: float, work: Work) -> Frame:
         rate = (memory.last + memory.next) / (2 * h)
         if not tau:
             return Frame(memory.hi, memory.lo, rate)
         pi = system.back(system.frame(system.shape(memory.hi, memory.lo)), system.weights * rate)
-        return RK4().at(system, Phase(memory.hi, memory.lo, pi), tau, h)
+        return RK4().at(system, Phase(memory.hi, memory.lo, pi), tau, h, work)
 
     def kinetic(self, system: SkewGradient, memory: TwoStep, h: float) -> float:
         return system.kinetic(memory.next / h)

@@ -32,8 +32,8 @@ class Midpoint(OneStep):
     Parameters
     ----------
     sweeps : the most sweeps in one step.
-    tolerance : a step is converged when a sweep changes no move of the step by more than this part of the chain's length
-        (of a radian for theta: this part of as many radians); 0 makes every step take all `sweeps`.
+    tolerance : a step is converged when a sweep changes no move of the step by more than this part of the chain's length,
+        or of a radian; 0 makes every step take all `sweeps`.
     """
 
     sweeps: int = 50
@@ -43,7 +43,7 @@ class Midpoint(OneStep):
     order: ClassVar[int] = 2
     preserves: ClassVar[str] = "energy exactly; the rolling constraint; reversible when converged"
     reference: ClassVar[str] = "Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.2"
-    explicit: ClassVar[bool] = False
+    stability_limit: ClassVar[float] = np.inf
 
     def __post_init__(self) -> None:
         checks.whole("sweeps", self.sweeps, 1)
@@ -59,7 +59,7 @@ class Midpoint(OneStep):
             change = system.solve(secant, c, h, z.pi - p - 0.5 * h * system.back(c, system.mean_force(secant)))
             p = p + change
             last, move = move, 0.5 * h * system.forward(c, p)
-            if np.abs(move - last).max() <= self.tolerance * system.length:
+            if (np.abs(move - last).max(axis=1) <= self.tolerance * system.scale).all():
                 break
         work.gradients += sweep
         work.solves += sweep

@@ -19,7 +19,7 @@ class RK4(OneStep):
     order: ClassVar[int] = 4
     preserves: ClassVar[str] = "the rolling constraint"
     reference: ClassVar[str] = "Kutta, Z. Math. Phys. 46 (1901) 435"
-    explicit: ClassVar[bool] = True
+    stability_limit: ClassVar[float] = 2.8
 
     def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)

@@ -2,17 +2,20 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
+from compare import overview
 from compare.__main__ import main
 from compare.outputs import fresh_files
+from continuum import breathing_ring
 
 FILES = ["convergence.csv", "convergence.png", "energy.png", "motion.png"]
 
 
 def test_main_job(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("compare.main_job.LONG", 5.0)
+    monkeypatch.setattr("compare.main_job.LONG", 1.0)
     out = tmp_path / "new" / "out"
     assert main(["--out", str(out), "--n", "9", "17", "--tol", "1e-3", "--quiet"]) == 0
     assert sorted(p.name for p in out.iterdir()) == FILES
@@ -49,11 +52,36 @@ def test_bad_input_is_one_line_and_leaves_nothing(arguments, message, tmp_path, 
     assert not out.exists()
 
 
+def test_motion_that_cannot_go_on(tmp_path, capsys):
+    """The ring of the unit law becomes a point: exit code 1, whichever process met it, and nothing written."""
+    (tmp_path / "ring.toml").write_text('scene = "breathing_ring"\nrolling = "unit"\nduration = 2.0\n')
+    out = tmp_path / "a" / "out"
+    assert main(["--scene", str(tmp_path / "ring.toml"), "--out", str(out), "--n", "8", "16", "--quiet"]) == 1
+    assert "lost its heading" in capsys.readouterr().err
+    assert not out.parent.exists()
+
+
+def test_overview_without_a_second_process(tmp_path):
+    """As a plain function, also of a scene that no process could be sent."""
+    scene = replace(breathing_ring(duration=0.2), initial=lambda s: breathing_ring().initial(s))
+    overview(scene, tmp_path, (8, 16), 1e-3, progress=False)
+    assert sorted(p.name for p in tmp_path.iterdir()) == FILES
+
+
+def test_scene_without_motion(tmp_path, capsys):
+    (tmp_path / "still.toml").write_text('scene = "untwisting_rod"\ntwist = 0.0\nduration = 0.5\n')
+    assert main(["--scene", str(tmp_path / "still.toml"), "--out", str(tmp_path / "out"), "--n", "9", "17", "--quiet"]) == 0
+    assert "-" in capsys.readouterr().out
+
+
 def test_unwritable_out(tmp_path, capsys):
     (tmp_path / "file").write_text("in the way")
     assert main(["--out", str(tmp_path / "file" / "out"), "--quiet"]) == 2
     assert "--out must be a folder that can be written to" in capsys.readouterr().err
     assert main(["--out", str(tmp_path / "file"), "--quiet"]) == 2
+    (tmp_path / "energy.png").mkdir()
+    with pytest.raises(ValueError, match="--out holds a folder where a file is to be written"), fresh_files(tmp_path) as folder:
+        (folder / "energy.png").write_text("")
 
 
 def test_failure_leaves_old_results(tmp_path):

@@ -70,3 +70,7 @@ def test_lump():
         convergence(scene, (33, 17), progress=False)
     with pytest.raises(ValueError, match="increasing whole numbers of discs; got"):
         convergence(scene, (17.5, 33), progress=False)
+    early = solve(scene, 1e-2, frames=[0.0, 1.0], progress=False)
+    for field in (early, solve(scene, method="leapfrog", progress=False)):
+        with pytest.raises(ValueError, match=r"field must be solve\(scene, tol\) of this scene up to t = 4.5, with an error"):
+            convergence(scene, (9, 17), field=field, progress=False)

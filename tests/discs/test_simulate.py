@@ -1,5 +1,6 @@
 """The door: frames, suggestions, refusals, and runs that go wrong."""
 
+import pickle
 import re
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from continuum import breathing_ring, untwisting_rod
 from continuum.mesh import semidiscretise
-from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, simulate, suggest_dt
+from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, Suzuki4, simulate, suggest_dt
 from discs.integrators import METHODS
 from tests.conftest import Model, uneven
 
@@ -86,7 +87,7 @@ def test_blow_up_names_step_time_disc_and_cause():
 def test_collapsing_ring_stops_with_time_and_disc(dt):
     scene = breathing_ring("unit", duration=4.0, omega=0.4)
     with pytest.raises(SimulationError, match="lost its heading") as caught:
-        simulate(semidiscretise(scene, 24), "midpoint", dt, progress=False)
+        simulate(semidiscretise(scene, 24, "consistent"), "midpoint", dt, progress=False)
     a0, rod = scene.rod.length / (2 * np.pi), scene.rod
     nu = rod.radius / a0**2 * np.sqrt(rod.bending_stiffness / rod.inertia)
     collapse = np.arctan(a0 * nu / (rod.radius * 0.4)) / nu
@@ -203,7 +204,7 @@ def test_headings_are_given_where_they_belong():
     with pytest.raises(ValueError, match="stretch_stiffness goes with curvature='true'"):
         Chain(**PARAMETERS | {"stretch_stiffness": 1.0})
     with pytest.raises(ValueError, match="curvature='true' needs links with a direction: discs 2 and 3 are in one place"):
-        Problem(Chain(**PARAMETERS | {"curvature": "true"}), State(np.where(s > s[2], s - s[1], s), 0 * s, 0 * s), 1.0)
+        Problem(Chain(**PARAMETERS | {"curvature": "true"}), State(s[[0, 1, 2, 2, 3, 4, 5, 6]], 0 * s, 0 * s), 1.0)
     with pytest.raises(ValueError, match="modified_energy needs a quadratic potential"):
         simulate(uneven(7, Model("springs", "steered")), "leapfrog", 0.01, want="modified_energy", progress=False)
 
@@ -216,3 +217,31 @@ def test_two_steered_discs():
     np.testing.assert_allclose(run.x.sum(axis=1), 3.0, atol=1e-12)
     np.testing.assert_allclose(run.y.sum(axis=1), 0.0, atol=1e-12)
     assert np.ptp(run.y) > 0.1
+
+
+def test_the_last_part_of_a_step_is_watched_too():
+    """A step longer than the run: the one frame is reached by a shorter step, which blows up."""
+    problem = semidiscretise(untwisting_rod(), 17, "springs")
+    for name in ("rk4", "leapfrog"):
+        with pytest.raises(SimulationError, match="blew up"):
+            simulate(problem, name, 100.0, frames=1, progress=False)
+    run = simulate(problem, "midpoint", 100.0, frames=1, progress=False)
+    assert run.stats["steps"] == 0
+    assert run.stats["solves"] > 0
+
+
+def test_errors_travel_between_processes():
+    error = SimulationError("the run blew up", 3, 0.5, 7)
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.step, again.time, again.disc) == (str(error), 3, 0.5, 7)
+
+
+def test_wrong_kinds_are_refused():
+    with pytest.raises(ValueError, match=r"simulate takes a Problem.*got Scene"):
+        simulate(untwisting_rod())
+    with pytest.raises(ValueError, match="want must be names of quantities; got 5"):
+        simulate(uneven(7, Model("springs", "field")), want=5)
+    with pytest.raises(ValueError, match="increasing times within"):
+        simulate(uneven(7, Model("springs", "field")), frames=["a"])
+    with pytest.raises(ValueError, match="base must be a Midpoint; got 'midpoint'"):
+        Suzuki4("midpoint")

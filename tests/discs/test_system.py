@@ -96,9 +96,10 @@ def test_skew_gradient_form_is_lagrange_d_alembert(model, sign):
     """Accelerations from the saddle point of multipliers; with the paper's misprinted sign (plus e.lambda) they must differ."""
     problem = uneven(N, model)
     system, z, shape = quantities(problem)
-    n, rows, e, omega = N, len(system.rows), system.contact(shape), np.asarray(problem.initial.omega)
+    n, rows, omega = N, len(system.rows), np.asarray(problem.initial.omega)
+    e = contact_from_the_definition(problem, z.hi)
     velocity = np.array([*(e * omega), omega, np.asarray(problem.initial.phi_rate)][:rows])
-    turned = directional(lambda q: system.contact(system.shape(q)), z.hi, velocity)  # e.
+    turned = directional(lambda q: contact_from_the_definition(problem, q), z.hi, velocity)  # e.
     # M q.. - A^T lambda = -grad V,  A q.. = e. omega,  with rows (r. - e theta.) of A and signs of its transpose by hand
     a = np.zeros((2 * n, rows * n))
     a[:, : 2 * n] = np.eye(2 * n)
@@ -123,12 +124,44 @@ def test_skew_gradient_form_is_lagrange_d_alembert(model, sign):
         assert difference > 1e-2
 
 
+def contact_from_the_definition(problem: Problem, q):
+    """e = R J r' (field), R J r'/|r'| (unit, true), R (-sin phi, cos phi), with ghosts in place of stencils; (2, n)."""
+    chain, k = problem.chain, problem.chain.k
+    radius = np.asarray(chain.radius)
+    if not isinstance(chain, Chain):
+        return radius * np.array([-np.sin(q[3]), np.cos(q[3])])
+    r = q[:2]
+    if chain.ends == "ring":
+        slope = (np.roll(r, -1, axis=1) - np.roll(r, 1, axis=1)) / (2 * k)
+    else:
+        inner = (r[:, 2:] - r[:, :-2]) / (2 * k)
+        if chain.ends == "consistent":
+            first = r[:, 1] - (4 * r[:, 0] - 6 * r[:, 1] + 4 * r[:, 2] - r[:, 3])
+            last = (4 * r[:, -1] - 6 * r[:, -2] + 4 * r[:, -3] - r[:, -4]) - r[:, -2]
+        else:
+            first, last = -3 * r[:, 0] + 4 * r[:, 1] - r[:, 2], 3 * r[:, -1] - 4 * r[:, -2] + r[:, -3]
+        slope = np.column_stack([first / (2 * k), inner, last / (2 * k)])
+    if chain.rolling == "unit":
+        slope = slope / np.hypot(*slope)
+    return radius * np.array([-slope[1], slope[0]])
+
+
+@models(ALL)
+def test_contact_direction(model):
+    problem = uneven(N, model)
+    system, z, shape = quantities(problem)
+    np.testing.assert_allclose(system.contact(shape), contact_from_the_definition(problem, z.hi), atol=1e-14)
+
+
 @models(ALL)
 def test_energy_is_constant_along_the_flow(model):
-    system, z, shape = quantities(uneven(N, model))
-    c, gradient = system.frame(shape), system.gradient(shape)
-    power = np.vdot(system.forward(c, z.pi), gradient) - np.vdot(z.pi, system.back(c, gradient))
-    assert abs(power) < 1e-13 * np.abs(gradient).sum()
+    """dH/dt by differences of |pi|^2/2 + V along (q., pi.), V from its definition."""
+    problem = uneven(N, model)
+    system, z, shape = quantities(problem)
+    c = system.frame(shape)
+    q_rate, pi_rate = system.forward(c, z.pi), -system.back(c, system.gradient(shape))
+    power = directional(lambda q: potential_from_the_definition(problem, q), z.hi, q_rate) + np.vdot(z.pi, pi_rate)
+    assert abs(power) < 1e-8 * np.abs(z.pi * pi_rate).sum()
 
 
 @models(ALL)
