@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Okabe and Ito's colours, distinct for colour-blind readers
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
 LABEL = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
-SYMBOL = ("x", "y", "θ")
+SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
 
 
 def _axes(ax: Axes | None, width: float, height: float) -> Axes:
@@ -39,11 +39,12 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
     if any((s.error > 0).any() for s in studies):
         ax.set_yscale("log")  # a motion without error, as of a rod at rest, has no logarithm
     for study, colour in zip(studies, (ORANGE, BLUE, GREEN, PURPLE), strict=False):
-        for j, (symbol, marker, line) in enumerate(zip(SYMBOL, "os^", ("-", "--", ":"), strict=True)):
-            label = f"{LABEL[study.ends]}, {symbol}"
+        for j, (name, marker, line) in enumerate(zip(study.fields, "os^d", ("-", "--", ":", "-."), strict=False)):
+            label = f"{LABEL[study.ends]}, {SYMBOL[name]}"
             ax.plot(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
     # the two slopes, each drawn beside the curves that should follow it
-    slopes = [(1, s, 1.7) for s in studies if s.ends == "springs"] + [(2, s, 0.5) for s in studies if s.ends != "springs"]
+    first = [s for s in studies if s.ends == "springs" and s.scene.rod.curvature == "linear"]
+    slopes = [(1, s, 1.7) for s in first] + [(2, s, 0.5) for s in studies if s not in first]
     for slope, study, beside in slopes:
         n = study.n[-3:].astype(float)
         level = study.error[-1].max() if beside > 1 else study.error[-1].min()

@@ -10,7 +10,7 @@ from tqdm import tqdm
 from compare import figures
 from compare.lump import lump
 from compare.outputs import fresh_files
-from compare.study import COLUMNS, Study, checked_sizes, convergence, format_table, write_csv
+from compare.study import Study, checked_sizes, convergence, format_table, write_csv
 from continuum import Scene, solve
 from discs import Solution, simulate
 
@@ -87,7 +87,7 @@ def energy_runs(scene: Scene, n: int = 32, progress: bool = False) -> dict[str, 
 def summary(studies: list[Study]) -> str:
     """The table of all studies, and what it is measured against."""
     scene, floor = studies[0].scene, max(s.floor for s in studies)
-    table = format_table([COLUMNS, *(row for study in studies for row in study.rows())])
+    table = format_table([studies[0].columns, *(row for study in studies for row in study.rows())])
     return (
         f"{scene.name}, {scene.rolling} law, t = {scene.duration:g}: largest error over the discs "
         f"against the field (estimated error {floor:.1e})\n{table}"

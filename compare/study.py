@@ -15,9 +15,7 @@ from continuum import Scene, solve
 from continuum.solver import spline
 from discs import Integrator, Midpoint, Problem, Solution, Suzuki4, checks, simulate
 
-FIELDS = ("x", "y", "theta")
 TIGHT = Suzuki4(Midpoint(tolerance=1e-10))
-COLUMNS = ("ends", "N", "k", *(f"error {f}" for f in FIELDS), *(f"order {f}" for f in FIELDS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +28,8 @@ class Study:
     ends : kind of ends of the chains.
     n : (S,), numbers of discs.
     k : (S,), spacings, length.
-    error : (S, 3), largest error over the discs of x, y (length) and theta (rad).
-    floor : estimated error of the field itself, the largest of x, y, theta.
+    error : (S, fields), largest error over the discs of x, y (length), theta and, of own headings, phi (rad).
+    floor : estimated error of the field itself, the largest over the fields.
     dt : time step of the chains.
     """
 
@@ -44,14 +42,24 @@ class Study:
     dt: float
 
     @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields compared."""
+        return compared(self.scene)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Heading of the table."""
+        return ("ends", "N", "k", *(f"error {f}" for f in self.fields), *(f"order {f}" for f in self.fields))
+
+    @property
     def order(self) -> NDArray:
-        """Measured order between neighbouring rows, (S - 1, 3): log of the ratio of errors over log of that of spacings."""
+        """Measured order between neighbouring rows, (S - 1, fields): log of the ratio of errors over log of that of spacings."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
 
     def rows(self) -> list[tuple[str, ...]]:
-        """The table as text, a row for each n; see COLUMNS."""
-        orders = [("", "", "")] + [tuple(f"{o:.2f}" if np.isfinite(o) else "-" for o in row) for row in self.order]
+        """The table as text, a row for each n."""
+        orders = [("",) * len(self.fields)] + [tuple(f"{o:.2f}" if np.isfinite(o) else "-" for o in row) for row in self.order]
         return [
             (self.ends, str(n), f"{k:.6f}", *(f"{e:.3e}" for e in error), *order)
             for n, k, error, order in zip(self.n, self.k, self.error, orders, strict=True)
@@ -59,7 +67,7 @@ class Study:
 
     def table(self) -> str:
         """The table, aligned for a terminal."""
-        return format_table([COLUMNS, *self.rows()])
+        return format_table([self.columns, *self.rows()])
 
     def plot(self, path: str | Path | None = None, *others: "Study", ax: Axes | None = None) -> Axes:
         """Error against n, with `others` in the same axes; saved if a path is given."""
@@ -86,7 +94,7 @@ def convergence(
     n : numbers of discs, increasing, at least one.
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame, at the end of the scene, counts.
-    dt : time step of the chains; None takes that of the field, whose effect is part of its error estimate.
+    dt : time step of the chains; None takes that of the field, whose effect is part of its error estimate, or duration/300.
     method : integrator of the chains.
     """
     sizes, problems = checked_sizes(scene, n, ends)
@@ -96,17 +104,23 @@ def convergence(
         raise ValueError(
             f"field must be solve(scene, tol) of this scene up to t = {scene.duration:g}, with an error estimate; got {field!r}"
         )
-    h = field.stats["dt"] if dt is None else checks.number("dt", dt, positive=True)
-    limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in FIELDS}
-    error = np.empty((len(problems), len(FIELDS)))
+    h = field.stats["dt"] or scene.duration / 300 if dt is None else checks.number("dt", dt, positive=True)
+    fields = compared(scene)
+    limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in fields}
+    error = np.empty((len(problems), len(fields)))
     bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
         run = simulate(problem, method, h, frames=1, progress=False)
-        for j, name in enumerate(FIELDS):
+        for j, name in enumerate(fields):
             error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
-    floor = max(field.error_estimate[name] for name in FIELDS)
+    floor = max(field.error_estimate[name] for name in fields)
     k = np.array([problem.chain.k for problem in problems])
     return Study(scene, problems[0].chain.ends, sizes, k, error, floor, h)
+
+
+def compared(scene: Scene) -> tuple[str, ...]:
+    """Names of the fields of a scene that a study compares."""
+    return ("x", "y", "theta", "phi") if scene.steered else ("x", "y", "theta")
 
 
 def checked_sizes(scene: Scene, n: ArrayLike, ends: str) -> tuple[NDArray, list[Problem]]:
@@ -119,7 +133,7 @@ def checked_sizes(scene: Scene, n: ArrayLike, ends: str) -> tuple[NDArray, list[
 
 def _periodic(scene: Scene, name: str, run: Solution) -> NDArray:
     """A field (F, N) less the part that grows around a rod periodic up to a shift."""
-    shift = dict(zip(("x", "y"), scene.shift, strict=True)).get(name, 0.0)
+    shift = {"x": scene.shift[0], "y": scene.shift[1], "phi": 2 * np.pi * scene.turns}.get(name, 0.0)
     return getattr(run, name) - shift * run.s / scene.rod.length
 
 
@@ -133,4 +147,4 @@ def format_table(rows: list[tuple[str, ...]]) -> str:
 def write_csv(path: Path, studies: list[Study]) -> None:
     """The table of several studies as CSV."""
     with path.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([COLUMNS, *(row for study in studies for row in study.rows())])
+        csv.writer(file).writerows([studies[0].columns, *(row for study in studies for row in study.rows())])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from continuum.rod import Rod
+from continuum.rod import Rod, SteeredRod
 from discs import checks
 from discs.chain import ROLLING
 
@@ -56,3 +56,28 @@ def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: floa
     with np.errstate(divide="ignore", invalid="ignore"):
         square = np.where(b > 0, 2 * last / (root + b), (root - b) / (2 * rod.inertia))
     return np.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square))
+
+
+def steered_frequencies(rod: SteeredRod, q: ArrayLike, k: float | None = None) -> NDArray:
+    """Frequencies of small waves of the straight rod whose sections have headings of their own, at rest or rolling.
+
+    With small phi, y = R theta + const and sideways force G (y' - phi): (M Omega^2 - (beta + G R^2) q^2)(J Omega^2 - K q^2 - G)
+    = G^2 R^2 q^2. Both Omega^2 are positive: no wave grows. Rolling at a rate omega adds only x. = -R omega phi, which nothing
+    depends on at first order. For discs of spacing k, t = 4/k^2 sin^2(qk/2) stands for q^2, and c = cos(qk/2) for the mean of two
+    headings: (M Omega^2 - (beta + G R^2) t)(J Omega^2 - K t - G c^2) = G^2 R^2 t c^2.
+
+    Returns
+    -------
+    (2, ...) : the slower and the faster branch, for q of any shape.
+    """
+    t, _ = symbols(q, k)
+    c2 = np.ones_like(t) if k is None else np.cos(np.asarray(q) * k / 2) ** 2
+    g, r2 = rod.shear_stiffness, rod.radius**2
+    roll = (rod.torsion_stiffness + g * r2) * t / rod.inertia
+    turn = (rod.bending_stiffness * t + g * c2) / rod.heading_inertia
+    coupling = g**2 * r2 * t * c2 / (rod.inertia * rod.heading_inertia)
+    fast = 0.5 * (roll + turn) + np.sqrt(0.25 * (roll - turn) ** 2 + coupling)
+    # the product of the roots without the cancellation: (beta + G R^2) t (K t + G c^2) - G^2 R^2 t c^2
+    product = t * (rod.torsion_stiffness * (rod.bending_stiffness * t + g * c2) + g * r2 * rod.bending_stiffness * t)
+    slow = product / (rod.inertia * rod.heading_inertia * fast)
+    return np.sqrt(np.stack([slow, fast]))

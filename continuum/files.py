@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 from continuum.rod import Scene
-from continuum.scenes import PAPER, SCENES
+from continuum.scenes import LAW, PAPER, SCENES, steered_rod
 from discs import checks
 
 
@@ -30,5 +30,5 @@ def read_scene(path: str | Path) -> Scene:
     make = SCENES[checks.choice("scene", content.pop("scene", None), SCENES)]
     own = [name for name, p in inspect.signature(make).parameters.items() if p.kind is not p.VAR_KEYWORD]
     for key in content:
-        checks.choice(f"key of {make.__name__}", key, (*own, *PAPER))
+        checks.choice(f"key of {make.__name__}", key, (*own, *PAPER, *(LAW if make is not steered_rod else ())))
     return make(**content)

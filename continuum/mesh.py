@@ -1,7 +1,9 @@
 """The rod on a mesh: second-order finite differences in s, which read as rolling discs."""
 
-from continuum.rod import Scene
-from discs import Chain, Problem, State, checks, stencils
+from typing import Any
+
+from continuum.rod import Scene, SteeredRod
+from discs import Chain, Problem, State, SteeredChain, checks, stencils
 
 
 def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
@@ -9,7 +11,7 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
 
     A node with its share of length is a disc, a finite difference of the potential is a spring: with the stencils of
     `discs.stencils` the energy is that of a chain, and the constraint that of rolling discs. A closed scene makes a ring
-    whatever `ends` says.
+    whatever `ends` says. Discs with headings of their own (`SteeredRod`) have one kind of free ends, "springs".
 
     Parameters
     ----------
@@ -20,19 +22,19 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     if ends == "ring" and not scene.closed:
         raise ValueError("ends='ring' needs a closed scene; this one has two free ends: take 'springs' or 'consistent'")
     rod = scene.rod
-    chain = Chain(
-        n=n,
-        length=rod.length,
-        density=rod.density,
-        spin_inertia=rod.spin_inertia,
-        torsion_stiffness=rod.torsion_stiffness,
-        bending_stiffness=rod.bending_stiffness,
-        radius=rod.radius,
-        rolling=scene.rolling,
-        ends="ring" if scene.closed else ends,
-        shift=scene.shift,
-    )
+    common: dict[str, Any] = {
+        name: getattr(rod, name)
+        for name in ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness", "radius")
+    } | {"n": n, "ends": "ring" if scene.closed else ends, "shift": scene.shift}
+    chain: Chain | SteeredChain
+    if isinstance(rod, SteeredRod):
+        beams: dict[str, Any] = {"shear_stiffness": rod.shear_stiffness, "heading_inertia": rod.heading_inertia}
+        chain = SteeredChain(**common, **beams, turns=scene.turns)
+    else:
+        chain = Chain(**common, rolling=scene.rolling, curvature=rod.curvature)
     fields = scene.initial(chain.s)
-    if not isinstance(fields, tuple) or len(fields) != 4:
-        raise ValueError(f"the scene's initial fields must be x, y, theta and omega; got {type(fields).__name__} {fields!r:.60}")
-    return Problem(chain, State(*fields), scene.duration)
+    names = ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if scene.steered else 4]
+    if not isinstance(fields, tuple) or len(fields) != len(names):
+        given = f"{len(fields)} of them" if isinstance(fields, tuple) else type(fields).__name__
+        raise ValueError(f"the scene's initial fields must be the tuple {', '.join(names)}; got {given}")
+    return Problem(chain, State(**dict(zip(names, fields, strict=True))), scene.duration)

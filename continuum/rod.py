@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
-from discs.chain import ROLLING
+from discs.chain import CURVATURE, ROLLING
 
-Fields = Callable[[NDArray], tuple[NDArray, NDArray, NDArray, NDArray]]
+Fields = Callable[[NDArray], tuple[NDArray, ...]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +26,8 @@ class Rod:
     torsion_stiffness : beta, >= 0.
     bending_stiffness : K, >= 0.
     radius : R, of the discs, > 0.
+    curvature : "linear", bending energy K |r''|**2/2, the paper's; "true", K phi'**2/2 with phi the direction of the line.
+    stretch_stiffness : A, >= 0, adds A (|r'| - 1)**2/2; only with the true curvature.
 
     Raises
     ------
@@ -38,20 +40,56 @@ class Rod:
     torsion_stiffness: float
     bending_stiffness: float
     radius: float
+    curvature: str = "linear"
+    stretch_stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("length", "density", "radius"):
-            object.__setattr__(self, name, checks.number(name, getattr(self, name), positive=True))
-        for name in ("spin_inertia", "torsion_stiffness", "bending_stiffness"):
-            value = checks.number(name, getattr(self, name))
-            if value < 0:
-                raise ValueError(f"{name} must be at least 0; got {value!r}")
-            object.__setattr__(self, name, value)
+        _settle(self, ("length", "density", "radius"), positive=True)
+        _settle(self, ("spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness"))
+        self._check_law()
+
+    def _check_law(self) -> None:
+        checks.choice("curvature", self.curvature, CURVATURE)
+        if self.curvature == "linear" and self.stretch_stiffness:
+            raise ValueError("stretch_stiffness goes with curvature='true'; with 'linear' it must be 0")
 
     @property
     def inertia(self) -> float:
         """M = alpha + rho R**2, inertia per length against rolling while |r'| = 1."""
         return self.spin_inertia + self.density * self.radius**2
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteeredRod(Rod):
+    """A rod whose sections have headings phi of their own: the planar Simo-Reissner rod, rolling; see `continuum.elements`.
+
+    Parameters
+    ----------
+    heading_inertia : J, moment of inertia about the vertical per length, > 0.
+    stretch_stiffness, shear_stiffness : A, G >= 0, force per stretch and per shear angle.
+    The others are those of `Rod`; bending is K phi'**2/2.
+    """
+
+    shear_stiffness: float
+    heading_inertia: float
+    curvature: str = "true"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _settle(self, ("shear_stiffness",))
+        _settle(self, ("heading_inertia",), positive=True)
+
+    def _check_law(self) -> None:
+        checks.choice("curvature (own headings)", self.curvature, ("true",))
+
+
+def _settle(rod: Rod, names: tuple[str, ...], positive: bool = False) -> None:
+    """Check parameters and store them as floats."""
+    for name in names:
+        value = checks.number(name, getattr(rod, name), positive=positive)
+        if value < 0:
+            raise ValueError(f"{name} must be at least 0; got {value!r}")
+        object.__setattr__(rod, name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +99,13 @@ class Scene:
     Parameters
     ----------
     rod : the rod.
-    initial : a function of the places s (n,) that returns x, y, theta, omega, each (n,).
+    initial : a function of the places s (n,) that returns x, y, theta, omega, each (n,); for a `SteeredRod` also phi and its
+        rate.
     duration : time, > 0.
     rolling : "field", r. = R omega J r' (the paper's (constraints)), or "unit", r. = R omega J r'/|r'| (constraintsphi).
     closed : periodic in s rather than with two free ends.
     shift : for a closed rod, r(s + length) - r(s); (0, 0) is a ring, (length, 0) a straight periodic rod.
+    turns : for a closed `SteeredRod`, whole turns of the heading around it: 1 for a circle.
     name : for titles.
 
     Raises
@@ -79,6 +119,7 @@ class Scene:
     rolling: str = "field"
     closed: bool = False
     shift: tuple[float, float] = (0.0, 0.0)
+    turns: int = 0
     name: str = "scene"
 
     def __post_init__(self) -> None:
@@ -86,9 +127,16 @@ class Scene:
             raise ValueError(f"a scene needs a Rod and a function of s; got {self.rod!r} and {self.initial!r}")
         if not isinstance(self.closed, bool):
             raise ValueError(f"closed must be True or False; got {self.closed!r}")
+        if self.steered:
+            checks.choice("rolling (own headings)", self.rolling, ("unit",))
         checks.choice("rolling", self.rolling, ROLLING)
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
         shift = checks.field("shift", self.shift, 2)
         if shift.any() and not self.closed:
             raise ValueError(f"shift belongs to a closed rod; got shift={self.shift} with closed=False")
         object.__setattr__(self, "shift", tuple(np.asarray(shift).tolist()))
+
+    @property
+    def steered(self) -> bool:
+        """Whether sections have headings of their own."""
+        return isinstance(self.rod, SteeredRod)

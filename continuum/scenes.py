@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from continuum.rod import Rod, Scene
+from continuum.rod import Rod, Scene, SteeredRod
 from discs import checks
 
 PAPER = {
@@ -19,13 +19,16 @@ PAPER = {
 }
 
 
+LAW = ("curvature", "stretch_stiffness")
+
+
 def _rod(given: dict[str, Any]) -> Rod:
     for name in given:
-        checks.choice("rod parameter", name, PAPER)
+        checks.choice("rod parameter", name, (*PAPER, *LAW))
     return Rod(**(PAPER | given))
 
 
-def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: float) -> Scene:
+def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: Any) -> Scene:
     """The paper's scene: a straight rod at rest, twisted by theta = -pi twist cos(pi s/length), let go.
 
     `twist` is the number of turns between the two ends, the paper's value 1/2. E(0) = beta pi**4 twist**2/(4 length), which
@@ -37,13 +40,34 @@ def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float =
     return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, name="untwisting rod")
 
 
+def steered_rod(
+    stretch_stiffness: float = 10.0,
+    shear_stiffness: float = 10.0,
+    heading_inertia: float = 0.25,
+    duration: float = 4.5,
+    twist: float = 0.5,
+    **parameters: Any,
+) -> Scene:
+    """The paper's twist of a rod whose sections have headings of their own, phi = 0 at rest; see `SteeredRod`."""
+    for name in parameters:
+        checks.choice("rod parameter", name, PAPER)
+    rod = SteeredRod(
+        **(PAPER | parameters),
+        stretch_stiffness=stretch_stiffness,
+        shear_stiffness=shear_stiffness,
+        heading_inertia=heading_inertia,
+    )
+    initial = partial(_steered, length=rod.length, amplitude=np.pi * checks.number("twist", twist))
+    return Scene(rod=rod, initial=initial, duration=duration, rolling="unit", name="steered rod")
+
+
 def rolling_rod(
     rolling: str = "field",
     duration: float = 10.0,
     omega: float = 1.0,
     mode: int = 1,
     amplitude: float = 1e-6,
-    **parameters: float,
+    **parameters: Any,
 ) -> Scene:
     """A straight rod, periodic up to a shift, that rolls sideways at the rate `omega`, slightly perturbed.
 
@@ -66,7 +90,7 @@ def rolling_rod(
     )
 
 
-def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float = 0.4, **parameters: float) -> Scene:
+def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float = 0.4, **parameters: Any) -> Scene:
     """A circle of circumference `length`, all discs rolling at the rate `omega`: towards the centre if it is positive."""
     rod = _rod(parameters)
     initial = partial(_circle, radius=rod.length / (2 * np.pi), omega=checks.number("omega", omega))
@@ -75,6 +99,10 @@ def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float =
 
 def _twisted(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     return s, 0 * s, -amplitude * np.cos(np.pi * s / length), 0 * s
+
+
+def _steered(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, ...]:
+    return (*_twisted(s, length, amplitude), 0 * s, 0 * s)
 
 
 def _rolling(s: NDArray, q: float, radius: float, omega: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
@@ -87,4 +115,4 @@ def _circle(s: NDArray, radius: float, omega: float) -> tuple[NDArray, NDArray, 
     return radius * np.cos(angle), radius * np.sin(angle), 0 * s, np.full_like(s, omega)
 
 
-SCENES = {f.__name__: f for f in (untwisting_rod, rolling_rod, breathing_ring)}
+SCENES = {f.__name__: f for f in (untwisting_rod, steered_rod, rolling_rod, breathing_ring)}

@@ -7,20 +7,21 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from tqdm import tqdm
 
+from continuum.elements import solve_elements
 from continuum.mesh import semidiscretise
 from continuum.rod import Scene
 from discs import Midpoint, Solution, Suzuki4, checks, simulate, suggest_dt
+from discs.simulation import frame_times
 
 FIELDS = ("x", "y", "theta", "omega")
 COARSEST = 33
 FINEST = 8193
-METHODS = ("richardson", "leapfrog")
 
 
 def solve(
     scene: Scene,
     tol: float = 1e-5,
-    method: str = "richardson",
+    method: str | None = None,
     n: int | None = None,
     dt: float | None = None,
     frames: int | ArrayLike = 2,
@@ -35,14 +36,17 @@ def solve(
     The step of "suzuki4" is halved on the coarsest mesh until its effect is below a quarter of the tolerance; the effect is
     measured again on the finest mesh but one, and is part of the estimate.
 
+    "elements": for headings of their own (`SteeredRod`): spectral elements, halved until it no longer matters; see
+    `continuum.elements`.
+
     "leapfrog": the paper's explicit scheme on n points with step dt, both as in the paper (32, k^2/8) by default: plain
     springs, end discs of full weight, no error estimate.
 
     Parameters
     ----------
     scene : what to solve.
-    tol : largest error wanted in x, y (length) and theta (rad) over nodes and frames; "richardson" only.
-    method : "richardson" or "leapfrog".
+    tol : largest error wanted in x, y (length), theta and phi (rad) over nodes and frames; not of "leapfrog".
+    method : "richardson" or "leapfrog"; "elements" for headings of their own. The first that fits by default.
     n, dt : points and step of "leapfrog"; the step is below k^2/8 where that would be unstable.
     frames : number of frames, equally spaced over the duration with both ends, or their times.
     progress : show progress on anything that takes over a second.
@@ -56,13 +60,17 @@ def solve(
     ValueError : for a bad tolerance, method or mesh, and when the tolerance is not reached on the finest mesh, 8193 nodes.
     SimulationError : when the motion cannot go on; see `discs.simulate`.
     """
-    checks.choice("method", method, METHODS)
+    if method is None:
+        method = "elements" if scene.steered else "richardson"
+    checks.choice("method", method, ("elements",) if scene.steered else ("richardson", "leapfrog"))
     if method == "leapfrog":
         problem = semidiscretise(scene, 32 if n is None else n, ends="paper")
         step = min(problem.chain.k**2 / 8, suggest_dt(problem, "leapfrog")) if dt is None else dt
         return simulate(problem, "leapfrog", dt=step, frames=frames, want=("modified_energy",), progress=progress)
     if n is not None or dt is not None:
-        raise ValueError("n and dt belong to method='leapfrog'; 'richardson' chooses both from tol")
+        raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
+    if scene.steered:
+        return solve_elements(scene, checks.number("tol", tol, positive=True), frame_times(frames, scene.duration), progress)
     return _richardson(scene, checks.number("tol", tol, positive=True), frames, progress)
 
 

@@ -70,7 +70,7 @@ def simulate(
     want = _wanted(want, integrator)
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
-    times = _frame_times(frames, problem.duration)
+    times = frame_times(frames, problem.duration)
     system, n = problem.system, problem.chain.n
     # the number of whole steps before a frame; a frame within rounding of a step is taken at the step
     before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
@@ -212,7 +212,8 @@ def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:
     return tuple(checks.choice("want", name, (*WANTS, *integrator.offers)) for name in given)
 
 
-def _frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
+def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
+    """The times of frames, (F,), from their number or themselves; see `simulate`."""
     if np.ndim(frames) == 0:
         count = checks.whole("frames", frames, 1, "the last state is always one")
         return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])

@@ -139,6 +139,8 @@ class SlavedSystem(SkewGradient):
         return 0.5 * float((np.tile(self._bending, 2) * bends[0]) @ bends[1] + twist)
 
     def secant(self, shape: NDArray, dq: NDArray) -> NDArray | Line:
+        if self.quadratic and dq is self._no_step:
+            return shape
         change = stencils.links(dq, self._ends)
         if self.quadratic:
             return shape + 0.5 * change

@@ -125,7 +125,11 @@ class SkewGradient(ABC):
 
     def gradient(self, shape: Any) -> NDArray:
         """grad V, (rows, n)."""
-        return self.mean_force(self.secant(shape, np.zeros((len(self.rows), self.n))))
+        return self.mean_force(self.secant(shape, self._no_step))
+
+    @cached_property
+    def _no_step(self) -> NDArray:
+        return np.zeros((len(self.rows), self.n))
 
     # The linear system of an implicit step
 

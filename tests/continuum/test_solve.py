@@ -175,7 +175,7 @@ def test_bad_scenes_are_refused():
     ]:
         with pytest.raises(ValueError, match=message):
             Scene(**{"rod": rod, "initial": initial, "duration": 1.0} | change)
-    with pytest.raises(ValueError, match="initial fields must be x, y, theta and omega; got tuple"):
+    with pytest.raises(ValueError, match="initial fields must be the tuple x, y, theta, omega; got 3 of them"):
         semidiscretise(Scene(rod=rod, initial=lambda s: (s, s, s), duration=1.0), 9, "springs")
     bad = Scene(rod=rod, initial=lambda s: (s, s, s / 0.0, s), duration=1.0)
     with pytest.raises(ValueError, match="initial theta must be finite"), np.errstate(all="ignore"):
