@@ -4,6 +4,7 @@ import argparse
 import sys
 
 from compare.background import background
+from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from continuum import untwisting_rod
 from continuum.files import read_scene
@@ -26,6 +27,7 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--n", metavar="N", type=int, nargs="+", default=list(SIZES), help="numbers of discs (default: 17 ... 513)")
     p.add_argument("--tol", metavar="TOL", type=float, default=1e-5, help="largest error of the field (default: 1e-5)")
+    p.add_argument("--no-limits", action="store_true", help="of the default scene, leave out the discs with headings of their own")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     return p
 
@@ -39,6 +41,11 @@ def main(arguments: list[str] | None = None) -> int:
         scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
         with background() as executor:
             studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor)
+            print(summary(studies))
+            print(f"\nwritten to {options.out}: convergence.csv, convergence.png, motion.png, energy.png\n", flush=True)
+            if not options.scene and not options.no_limits:
+                print(limits(options.out, not options.quiet, executor=executor))
+                print(f"\nwritten to {options.out}: headings.csv, limits.csv, locking.csv, limits.png")
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -46,10 +53,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("interrupted; nothing was written", file=sys.stderr)
+        print("interrupted; what is in the folder is whole", file=sys.stderr)
         return 130
-    print(summary(studies))
-    print(f"\nwritten to {options.out}: convergence.csv, convergence.png, motion.png, energy.png")
     return 0
 
 

@@ -12,7 +12,7 @@ from compare.lump import lump
 from compare.outputs import fresh_files
 from compare.study import Study, checked_sizes, convergence, format_table, write_csv
 from continuum import Scene, solve
-from discs import Solution, simulate
+from discs import Solution, simulate, suggest_dt
 
 SIZES = (17, 33, 65, 129, 257, 513)
 T = TypeVar("T")
@@ -42,7 +42,7 @@ def overview(
     -------
     The studies, one for each kind of ends.
     """
-    kinds = ("springs",) if scene.closed else ("springs", "consistent")
+    kinds = ("springs",) if scene.closed or scene.steered else ("springs", "consistent")
     for ends in kinds:
         checked_sizes(scene, n, ends)
     long = scene if scene.closed else replace(scene, duration=LONG * scene.duration)
@@ -74,12 +74,14 @@ def _awaited(future: Future[T], what: str, progress: bool) -> T:
 
 def energy_runs(scene: Scene, n: int = 32, progress: bool = False) -> dict[str, Solution]:
     """A scene by the paper's explicit scheme and by the midpoint method, both with n discs and the paper's ends."""
-    explicit = solve(scene, method="leapfrog", n=n, frames=1001, progress=progress)
-    problem = lump(scene, n, ends="paper")
-    midpoint = simulate(problem, "midpoint", dt=problem.chain.k / 2, frames=1001, progress=progress)
-    part = problem.chain.k**2 / explicit.stats["dt"]
+    problem = lump(scene, n, ends="springs" if scene.steered else "paper")
+    k = problem.chain.k
+    step = min(k**2 / 8, suggest_dt(problem, "leapfrog"))
+    want = ("modified_energy",) if problem.system.quadratic else ()
+    explicit = simulate(problem, "leapfrog", step, frames=1001, want=want, progress=progress)
+    midpoint = simulate(problem, "midpoint", k / 2, frames=1001, progress=progress)
     return {
-        f"the paper's explicit scheme, N = {n}, h = k²/{part:.3g}": explicit,
+        f"the paper's explicit scheme, N = {n}, h = k²/{k**2 / step:.3g}": explicit,
         f"midpoint, N = {n}, h = k/2": midpoint,
     }
 

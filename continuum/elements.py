@@ -129,7 +129,7 @@ class Elements:
 
     def rate(self, _: float, flat: NDArray) -> NDArray:
         """The time derivative of the unknowns, flat."""
-        rod, (_, w, d) = self._rod, self._rule
+        rod, (w, d) = self._rod, self._rule[1:]
         q = flat.reshape(6, -1)
         u, twist, bend, (cos, sin) = self._strains(q)
         n1, n2 = rod.stretch_stiffness * (u[0] - 1), rod.shear_stiffness * u[1]

@@ -17,7 +17,7 @@ FILES = ["convergence.csv", "convergence.png", "energy.png", "motion.png"]
 def test_main_job(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("compare.main_job.LONG", 1.0)
     out = tmp_path / "new" / "out"
-    assert main(["--out", str(out), "--n", "9", "17", "--tol", "1e-3", "--quiet"]) == 0
+    assert main(["--out", str(out), "--n", "9", "17", "--tol", "1e-3", "--no-limits", "--quiet"]) == 0
     assert sorted(p.name for p in out.iterdir()) == FILES
     printed = capsys.readouterr().out
     assert "  17  0.250000  " in printed

@@ -1,0 +1,157 @@
+"""Discs with headings of their own: where they tend, and how they differ from the paper's rod."""
+
+import csv
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from compare import figures
+from compare.lump import lump
+from compare.outputs import fresh_files
+from compare.study import Study, convergence, format_table
+from continuum import solve, steered_rod, untwisting_rod
+from discs import Solution, simulate
+
+SIZES = (17, 33, 65, 129, 257, 513)
+FAMILY = (10.0, 40.0, 160.0)
+LOCKING = (1e1, 1e2, 1e3, 1e4, 1e5)
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Largest distances in s at the end of the paper's scene, between a steered rod and another model.
+
+    Attributes
+    ----------
+    against : the other model.
+    stretch, shear, inertia : (S,), A, G and J of the steered rods.
+    distance : (S, 3), in x, y (length) and theta (rad).
+    """
+
+    against: str
+    stretch: NDArray
+    shear: NDArray
+    inertia: NDArray
+    distance: NDArray
+
+    @property
+    def rate(self) -> NDArray:
+        """Slope of log distance against log G between rows, (S - 1, 3)."""
+        return np.diff(np.log(self.distance), axis=0) / np.diff(np.log(self.shear))[:, None]
+
+
+def _ends(field: Solution) -> NDArray:
+    every = (field.s.size - 1) // 64
+    return np.stack([getattr(field, name)[-1, ::every] for name in ("x", "y", "theta")])
+
+
+def distances(against: str, family: list[tuple[float, float, float]], other: Solution, tol: float) -> Distances:
+    """Solve steered rods (A, G, J) of a family and measure how far they end from another field."""
+    end = _ends(other)
+    found = [np.abs(_ends(solve(steered_rod(a, g, j), tol, progress=False)) - end).max(axis=1) for a, g, j in family]
+    a, g, j = np.array(family).T
+    return Distances(against, a, g, j, np.array(found))
+
+
+def towards_unit_law(shear: tuple[float, ...] = FAMILY, tol: float = 1e-4) -> Distances:
+    """G -> infinity with J = 1/G and A = 0: the heading has to follow the line, and has no inertia to resist.
+
+    The limit is the unit law with true curvature; the distance falls like 1/G.
+    """
+    limit = solve(untwisting_rod("unit", curvature="true"), tol, progress=False)
+    return distances("unit law, true curvature", [(0.0, g, 1 / g) for g in shear], limit, tol)
+
+
+def from_the_paper(tol: float = 1e-3) -> list[Distances]:
+    """How far rods with A = G ends from the paper's two laws: they are different models, and do not tend to them."""
+    family = [(0.0, 160.0, 1 / 160), (1.0, 10.0, 0.05), (10.0, 10.0, 0.25), (100.0, 100.0, 0.05)]
+    laws = [("field law, the paper's", "field"), ("unit law, the paper's", "unit")]
+    return [distances(name, family, solve(untwisting_rod(law), tol, progress=False), tol) for name, law in laws]
+
+
+def locking(stiffness: tuple[float, ...] = LOCKING, n: int = 33) -> NDArray:
+    """A = G -> infinity at J = 0.05: largest distance that any disc moves in [0, 4.5], for each stiffness, (S,).
+
+    A rod that neither stretches nor shears and rolls without sliding moves like a rigid body (the paper's section 3.5); from this
+    rest it has no such motion. The distance falls slowly, like A**(-1/5).
+    """
+    reach = []
+    for a in stiffness:
+        run = simulate(lump(steered_rod(a, a, 0.05), n), "midpoint", 0.01, frames=91, progress=False)
+        reach.append(np.hypot(run.x - run.s, run.y).max())
+    return np.array(reach)
+
+
+def limits(
+    out: str | Path, progress: bool = True, n: tuple[int, ...] = SIZES, tol: float = 1e-8, executor: Executor | None = None
+) -> str:
+    """All limits of the steered rod; writes headings.csv, limits.csv, locking.csv and limits.png to `out`; returns the tables as text."""
+    with fresh_files(out) as folder, tqdm(total=4, desc="own headings", unit="limit", delay=1, disable=not progress) as bar:
+        beside = executor.submit(convergence, steered_rod(), n, tol=tol, progress=False) if executor else None
+        unit = towards_unit_law()
+        bar.update()
+        reach = locking()
+        bar.update()
+        paper = from_the_paper()
+        bar.update()
+        study = beside.result() if beside else convergence(steered_rod(), n, tol=tol, progress=False)
+        bar.update()
+        rows: list[tuple[str, ...]] = [("against", "A", "G", "J", "distance x", "distance y", "distance theta")]
+        for d in (unit, *paper):
+            for a, g, j, apart in zip(d.stretch, d.shear, d.inertia, d.distance, strict=True):
+                rows.append((d.against, f"{a:g}", f"{g:g}", f"{j:g}", *(f"{v:.3e}" for v in apart)))
+        locks: list[tuple[str, ...]] = [("A = G", "largest motion")] + [
+            (f"{a:g}", f"{r:.4f}") for a, r in zip(LOCKING, reach, strict=True)
+        ]
+        for name, table in (("headings.csv", [study.columns, *study.rows()]), ("limits.csv", rows), ("locking.csv", locks)):
+            with (folder / name).open("w", newline="", encoding="utf-8") as file:
+                csv.writer(file).writerows(table)
+        _draw(study, unit, paper, reach).savefig(folder / "limits.png", dpi=150)
+    text = [
+        f"discs with headings of their own, A = G = 10, J = 0.25, t = 4.5 (field's estimated error {study.floor:.1e})",
+        study.table(),
+        "\nrods with headings of their own, A, G, J, against rods whose headings are slaved to the line, t = 4.5",
+        format_table(rows),
+        "\nA = G to infinity, J = 0.05: the rod locks",
+        format_table(locks),
+    ]
+    return "\n".join(text)
+
+
+def _draw(study: Study, unit: Distances, paper: list[Distances], reach: NDArray) -> Any:
+    figure = figures.Figure(figsize=(12, 9), layout="constrained")
+    axes = figure.subplots(2, 2)
+    figures.convergence([study], axes[0, 0])
+    axes[0, 0].set_title("(a) N discs against the field, A = G = 10, J = 0.25")
+    for j, (symbol, marker) in enumerate(zip(("x", "y", "θ"), "os^", strict=True)):
+        axes[0, 1].loglog(unit.shear, unit.distance[:, j], marker=marker, color=figures.BLUE, label=symbol)
+    _slope(axes[0, 1], unit.shear, 0.5 * unit.distance.min(axis=1)[0], -1.0, "slope −1")
+    axes[0, 1].set(
+        xlabel="G, with A = 0 and J = 1/G", ylabel="distance at t = 4.5", title="(b) to the unit law with true curvature"
+    )
+    axes[1, 0].loglog(LOCKING, reach, marker="o", color=figures.ORANGE, label="largest motion of any disc")
+    _slope(axes[1, 0], np.array(LOCKING), 0.6 * reach[0], -0.2, "slope −1/5")
+    axes[1, 0].set(xlabel="A = G, with J = 0.05", ylabel="length", title="(c) the rod locks")
+    kinds = [
+        f"A = {a:g}, G = {g:g}, J = {j:.2g}" for a, g, j in zip(paper[0].stretch, paper[0].shear, paper[0].inertia, strict=True)
+    ]
+    for d, colour, shift in zip(paper, (figures.ORANGE, figures.BLUE), (-0.18, 0.18), strict=True):
+        axes[1, 1].barh(
+            np.arange(len(kinds)) + shift, np.hypot(d.distance[:, 0], d.distance[:, 1]), 0.34, color=colour, label=d.against
+        )
+    axes[1, 1].set_yticks(np.arange(len(kinds)), kinds)
+    axes[1, 1].set(xlabel="distance of centre lines at t = 4.5, √(x² + y²) of the largest", title="(d) against the paper's rod")
+    for ax in axes.flat[1:]:
+        ax.grid(alpha=0.3, which="both" if ax is not axes[1, 1] else "major")
+        ax.legend(fontsize=8)
+    return figure
+
+
+def _slope(ax: Axes, x: NDArray, level: float, slope: float, text: str) -> None:
+    ax.loglog(x, level * (x / x[0]) ** slope, color=figures.GREY, linewidth=1, label=text)
