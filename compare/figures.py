@@ -50,7 +50,8 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
         level = study.error[-1].max() if beside > 1 else study.error[-1].min()
         line = beside * level * (n / n[-1]) ** -slope
         ax.plot(n, line, color=GREY, linewidth=1)
-        ax.text(n[-1] * 1.06, line[-1], f"slope {slope}", color=GREY, va="center", clip_on=False)
+        above = "bottom" if beside > 1 else "top"
+        ax.text(n[0], line[0], f"slope {slope}", color=GREY, ha="right", va=above)
     floor = max(s.floor for s in studies)
     if floor > 0:
         ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label="estimated error of the field")

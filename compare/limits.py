@@ -91,7 +91,10 @@ def locking(stiffness: tuple[float, ...] = LOCKING, n: int = 33) -> NDArray:
 def limits(
     out: str | Path, progress: bool = True, n: tuple[int, ...] = SIZES, tol: float = 1e-8, executor: Executor | None = None
 ) -> str:
-    """All limits of the steered rod; writes headings.csv, limits.csv, locking.csv and limits.png to `out`; returns the tables as text."""
+    """All limits of the steered rod: headings.csv, limits.csv, locking.csv and limits.png in `out`, and the tables as text.
+
+    An executor, if given, runs the convergence study beside the rest.
+    """
     with fresh_files(out) as folder, tqdm(total=4, desc="own headings", unit="limit", delay=1, disable=not progress) as bar:
         beside = executor.submit(convergence, steered_rod(), n, tol=tol, progress=False) if executor else None
         unit = towards_unit_law()
@@ -106,9 +109,8 @@ def limits(
         for d in (unit, *paper):
             for a, g, j, apart in zip(d.stretch, d.shear, d.inertia, d.distance, strict=True):
                 rows.append((d.against, f"{a:g}", f"{g:g}", f"{j:g}", *(f"{v:.3e}" for v in apart)))
-        locks: list[tuple[str, ...]] = [("A = G", "largest motion")] + [
-            (f"{a:g}", f"{r:.4f}") for a, r in zip(LOCKING, reach, strict=True)
-        ]
+        locks: list[tuple[str, ...]] = [("A = G", "largest motion")]
+        locks += [(f"{a:g}", f"{r:.4f}") for a, r in zip(LOCKING, reach, strict=True)]
         for name, table in (("headings.csv", [study.columns, *study.rows()]), ("limits.csv", rows), ("locking.csv", locks)):
             with (folder / name).open("w", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows(table)
@@ -146,7 +148,7 @@ def _draw(study: Study, unit: Distances, paper: list[Distances], reach: NDArray)
             np.arange(len(kinds)) + shift, np.hypot(d.distance[:, 0], d.distance[:, 1]), 0.34, color=colour, label=d.against
         )
     axes[1, 1].set_yticks(np.arange(len(kinds)), kinds)
-    axes[1, 1].set(xlabel="distance of centre lines at t = 4.5, √(x² + y²) of the largest", title="(d) against the paper's rod")
+    axes[1, 1].set(xlabel="distance of centre lines at t = 4.5, length", title="(d) against the paper's rod")
     for ax in axes.flat[1:]:
         ax.grid(alpha=0.3, which="both" if ax is not axes[1, 1] else "major")
         ax.legend(fontsize=8)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from continuum import solve, untwisting_rod
 from discs import Chain, Problem, State, SteeredChain
 
 
@@ -66,6 +67,12 @@ def uneven(n: int, model: Model, seed: int = 1, *, equal: bool = False) -> Probl
     else:
         chain = Chain(**common, rolling=law)
     return Problem(chain, State(x, y, theta, omega), 1.0)
+
+
+@pytest.fixture(scope="session")
+def paper_field():
+    """The field of the paper's scene to 1e-5, at t = 0, 2.25 and 4.5."""
+    return solve(untwisting_rod(), 1e-5, frames=3, progress=False)
 
 
 @pytest.fixture(params=["springs", "consistent", "paper", "ring"])

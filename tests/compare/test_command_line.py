@@ -8,6 +8,7 @@ import pytest
 
 from compare import overview
 from compare.__main__ import main
+from compare.limits import limits
 from compare.outputs import fresh_files
 from continuum import breathing_ring
 
@@ -22,6 +23,27 @@ def test_main_job(tmp_path, capsys, monkeypatch):
     printed = capsys.readouterr().out
     assert "  17  0.250000  " in printed
     assert (out / "convergence.csv").read_text().startswith("ends,N,k,error x")
+
+
+def test_limits_are_part_of_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("compare.main_job.LONG", 1.0)
+    monkeypatch.setattr("compare.__main__.limits", lambda out, *_, **__: f"limits of {out}")
+    assert main(["--out", str(tmp_path), "--n", "9", "17", "--tol", "1e-3", "--quiet"]) == 0
+    assert f"limits of {tmp_path}" in capsys.readouterr().out
+
+
+def test_limits_write_their_files(tmp_path):
+    text = limits(tmp_path, progress=False, n=(9, 17), tol=1e-6)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["headings.csv", "limits.csv", "limits.png", "locking.csv"]
+    assert "unit law, true curvature" in text
+
+
+def test_steered_scene(tmp_path, capsys):
+    (tmp_path / "steered.toml").write_text('scene = "steered_rod"\nduration = 0.5\nshear_stiffness = 6.0\nradius = 0.7\n')
+    out = tmp_path / "out"
+    assert main(["--scene", str(tmp_path / "steered.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-5", "--quiet"]) == 0
+    assert sorted(p.name for p in out.iterdir()) == FILES
+    assert "error phi" in capsys.readouterr().out
 
 
 def test_closed_scene(tmp_path, monkeypatch, capsys):

@@ -6,35 +6,31 @@ import numpy as np
 import pytest
 
 from compare import convergence, lump
+from compare.limits import locking, towards_unit_law
 from compare.study import write_csv
 from continuum import breathing_ring, solve, untwisting_rod
 
 
-@pytest.fixture(scope="module")
-def field():
-    return solve(untwisting_rod(), 1e-5, progress=False)
-
-
-def test_consistent_ends_converge_at_order_two(field):
-    study = convergence(untwisting_rod(), (129, 257, 513), "consistent", field=field, progress=False)
+def test_consistent_ends_converge_at_order_two(paper_field):
+    study = convergence(untwisting_rod(), (129, 257, 513), "consistent", field=paper_field, progress=False)
     assert study.order.shape == (2, 3)
     assert (study.order >= 1.9).all(), study.table()
     assert (study.order <= 2.4).all(), study.table()
     assert study.error[-1].max() < 5e-4
 
 
-def test_plain_springs_tend_to_order_one(field):
-    study = convergence(untwisting_rod(), (65, 129, 257, 513), "springs", field=field, progress=False)
+def test_plain_springs_tend_to_order_one(paper_field):
+    study = convergence(untwisting_rod(), (65, 129, 257, 513), "springs", field=paper_field, progress=False)
     assert (study.order <= 1.0).all(), study.table()
     assert (np.diff(study.order, axis=0) > 0).all(), study.table()
     assert (study.order[-1] > 0.85).all(), study.table()
     assert (study.error[-1] > 1e-2).all()
 
 
-def test_time_error_is_far_below_the_differences(field):
+def test_time_error_is_far_below_the_differences(paper_field):
     scene = untwisting_rod()
-    a = convergence(scene, (129,), "consistent", field=field, progress=False)
-    b = convergence(scene, (129,), "consistent", field=field, dt=a.dt / 2, progress=False)
+    a = convergence(scene, (129,), "consistent", field=paper_field, progress=False)
+    b = convergence(scene, (129,), "consistent", field=paper_field, dt=a.dt / 2, progress=False)
     assert np.abs(a.error - b.error).max() < 1e-3 * a.error.min()
 
 
@@ -46,9 +42,9 @@ def test_rings_need_no_ends(rolling, tmp_path):
     assert (tmp_path / "ring.png").stat().st_size > 10_000
 
 
-def test_table_and_csv_hold_the_same(field, tmp_path):
+def test_table_and_csv_hold_the_same(paper_field, tmp_path):
     scene = untwisting_rod()
-    studies = [convergence(scene, (9, 17), ends, field=field, progress=False) for ends in ("springs", "consistent")]
+    studies = [convergence(scene, (9, 17), ends, field=paper_field, progress=False) for ends in ("springs", "consistent")]
     write_csv(tmp_path / "table.csv", studies)
     with (tmp_path / "table.csv").open() as file:
         rows = list(csv.reader(file))
@@ -74,3 +70,12 @@ def test_lump():
     for field in (early, solve(scene, method="leapfrog", progress=False)):
         with pytest.raises(ValueError, match=r"field must be solve\(scene, tol\) of this scene up to t = 4.5, with an error"):
             convergence(scene, (9, 17), field=field, progress=False)
+
+
+def test_limits_of_own_headings():
+    """G -> infinity, J = 1/G tends to the unit law with true curvature like 1/G; A = G -> infinity locks."""
+    unit = towards_unit_law((40.0, 160.0))
+    assert unit.rate == pytest.approx(-1.0, abs=0.15), unit.distance
+    assert unit.distance[-1].max() < 4e-3
+    reach = locking((1e2, 1e4))
+    assert np.log(reach[1] / reach[0]) / np.log(100) == pytest.approx(-0.2, abs=0.02)

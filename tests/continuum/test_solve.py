@@ -14,21 +14,16 @@ from discs import Midpoint, SimulationError, Suzuki4, simulate
 FINE = Suzuki4(Midpoint(tolerance=1e-11))
 
 
-@pytest.fixture(scope="module")
-def accurate():
-    return solve(untwisting_rod(), 1e-5, frames=3, progress=False)
-
-
-def test_estimate_bounds_the_error_on_the_paper_s_scene(accurate):
+def test_estimate_bounds_the_error_on_the_paper_s_scene(paper_field):
     """Errors of looser solutions, against the one of 1e-5, are within their estimates and those within the tolerance."""
     for tol in (1e-3, 1e-4):
         field = solve(untwisting_rod(), tol, frames=3, progress=False)
-        every = (accurate.s.size - 1) // (field.s.size - 1)
+        every = (paper_field.s.size - 1) // (field.s.size - 1)
         for name in ("x", "y", "theta"):
-            error = np.abs(getattr(field, name) - getattr(accurate, name)[:, ::every]).max()
+            error = np.abs(getattr(field, name) - getattr(paper_field, name)[:, ::every]).max()
             assert error <= field.error_estimate[name] + 1e-5
             assert field.error_estimate[name] <= tol
-    assert max(accurate.error_estimate[name] for name in ("x", "y", "theta")) <= 1e-5
+    assert max(paper_field.error_estimate[name] for name in ("x", "y", "theta")) <= 1e-5
 
 
 def test_estimate_bounds_the_error_on_rings(rolling):
@@ -44,7 +39,7 @@ def test_estimate_bounds_the_error_on_rings(rolling):
         assert error <= field.error_estimate[name]
 
 
-def test_field_is_the_limit_of_plain_springs_too(accurate):
+def test_field_is_the_limit_of_plain_springs_too(paper_field):
     """An independent way to the same limit: springs make no assumption on the ends, and err like k. Twice extrapolated.
 
     What is left at n = 1025 after removing k and k^2 is 5e-5 to 1.1e-4, where the chain itself is off by 1e-2 to 2e-2.
@@ -56,17 +51,17 @@ def test_field_is_the_limit_of_plain_springs_too(accurate):
         a, b, c = (getattr(run, name)[-1, :: (run.s.size - 1) // 128] for run in runs)
         once = 2 * b - a, 2 * c - b
         twice = (4 * once[1] - once[0]) / 3
-        error = np.abs(twice - getattr(accurate, name)[-1, :: (accurate.s.size - 1) // 128]).max()
+        error = np.abs(twice - getattr(paper_field, name)[-1, :: (paper_field.s.size - 1) // 128]).max()
         assert error < 2e-4
-        assert error < 0.015 * np.abs(c - getattr(accurate, name)[-1, :: (accurate.s.size - 1) // 128]).max()
+        assert error < 0.015 * np.abs(c - getattr(paper_field, name)[-1, :: (paper_field.s.size - 1) // 128]).max()
 
 
-def test_energy_of_the_field_is_constant(accurate):
+def test_energy_of_the_field_is_constant(paper_field):
     """pi^4/80, at all frames, from the fields themselves by splines and the trapezoidal rule; unit masses, R = 1."""
     for f in range(3):
-        x, y, theta = (CubicSpline(accurate.s, getattr(accurate, name)[f]) for name in ("x", "y", "theta"))
-        s = accurate.s
-        kinetic = (1 + x(s, 1) ** 2 + y(s, 1) ** 2) * accurate.omega[f] ** 2 / 2
+        x, y, theta = (CubicSpline(paper_field.s, getattr(paper_field, name)[f]) for name in ("x", "y", "theta"))
+        s = paper_field.s
+        kinetic = (1 + x(s, 1) ** 2 + y(s, 1) ** 2) * paper_field.omega[f] ** 2 / 2
         potential = 0.8 * theta(s, 1) ** 2 / 2 + 0.7 * (x(s, 2) ** 2 + y(s, 2) ** 2) / 2
         assert np.trapezoid(kinetic + potential, s) == pytest.approx(np.pi**4 / 80, rel=1e-4)
 

@@ -1,0 +1,62 @@
+"""Prints the figures of docs/accuracy.md that no test asserts and `make run` does not show. Takes some minutes."""
+
+import numpy as np
+
+from compare import lump
+from continuum import breathing_ring, exact, solve, steered_rod, untwisting_rod
+from continuum.mesh import semidiscretise
+from discs import Midpoint, Solution, Suzuki4, simulate
+
+FINE = Suzuki4(Midpoint(tolerance=1e-11))
+FIELDS = ("x", "y", "theta")
+
+
+def last(run: Solution, cells: int) -> np.ndarray:
+    """Last frame on a mesh of `cells` cells, (3, cells + 1)."""
+    return np.stack([getattr(run, name)[-1, :: (run.s.size - 1) // cells] for name in FIELDS])
+
+
+def chains(ends: str, sizes: tuple[int, ...]) -> list[np.ndarray]:
+    """Paper's scene at t = 4.5 on the discs that the coarsest chain has."""
+    runs = (simulate(semidiscretise(untwisting_rod(), n, ends), FINE, 0.0225, frames=1, progress=False) for n in sizes)
+    return [last(run, sizes[0] - 1) for run in runs]
+
+
+def main() -> None:
+    """All of them."""
+    sizes = (257, 513, 1025, 2049, 4097)
+    u = chains("consistent", sizes)
+    change = [np.abs(b - a).max(axis=1) for a, b in zip(u, u[1:], strict=False)]
+    print("consistent ends, orders from the changes between", sizes)
+    print(np.log2(np.array(change[:-1]) / np.array(change[1:])))
+    t = [b + (b - a) / 3 for a, b in zip(u, u[1:], strict=False)]
+    print("changes of the extrapolated fields\n", np.array([np.abs(b - a).max(axis=1) for a, b in zip(t, t[1:], strict=False)]))
+
+    field = solve(untwisting_rod(), 1e-5, progress=False)
+    a, b, c = chains("springs", (513, 1025, 2049))
+    once = 2 * b - a, 2 * c - b
+    truth = last(field, 512)
+    print("plain springs at 2049, error", np.abs(c - truth).max(axis=1), "twice extrapolated",
+          np.abs((4 * once[1] - once[0]) / 3 - truth).max(axis=1))  # fmt: skip
+
+    for law in ("field", "unit"):
+        scene = breathing_ring(law)
+        ring = solve(scene, 1e-7, progress=False)
+        error = np.abs(np.hypot(ring.x, ring.y) - exact.ring(scene.rod, ring.t, 0.4, law).radius[:, None]).max()
+        print(f"ring, {law} law: radius off by {error:.1e}, estimated {ring.error_estimate}")
+
+    for name, scene in (("slaved", untwisting_rod(duration=150.0)), ("steered", steered_rod(duration=150.0))):
+        for multiple in (1, 2, 4, 8, 16):
+            problem = lump(scene, 129, "springs" if scene.steered else "consistent")
+            run = simulate(problem, "midpoint", multiple * problem.chain.k, frames=301, progress=False)
+            s = run.stats
+            print(f"{name}, N = 129, h = {multiple}k over [0, 150]: energy {np.abs(run.energy / run.energy[0] - 1).max():.1e}, "
+                  f"{s['solves'] / s['steps']:.1f} sweeps, {s['unconverged']} of {s['steps']} steps unconverged")  # fmt: skip
+    run = solve(untwisting_rod(duration=150.0), method="leapfrog", frames=1501, progress=False)
+    print(f"leapfrog: modified energy {np.ptp(run.modified_energy) / run.energy[0]:.1e}, steps {run.stats['steps']}, "
+          f"energy off by 1 % at t = {run.t[np.argmax(np.abs(run.energy / run.energy[0] - 1) > 0.01)]:.1f}, "
+          f"least {run.energy.min():.2f} of {run.energy[0]:.2f}")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
