@@ -1,5 +1,8 @@
 """Prints the figures of docs/accuracy.md that no test asserts and `make run` does not show. Takes some minutes."""
 
+import time as clock
+from itertools import pairwise
+
 import numpy as np
 
 from compare import lump
@@ -26,11 +29,11 @@ def main() -> None:
     """All of them."""
     sizes = (257, 513, 1025, 2049, 4097)
     u = chains("consistent", sizes)
-    change = [np.abs(b - a).max(axis=1) for a, b in zip(u, u[1:], strict=False)]
+    change = [np.abs(b - a).max(axis=1) for a, b in pairwise(u)]
     print("consistent ends, orders from the changes between", sizes)
     print(np.log2(np.array(change[:-1]) / np.array(change[1:])))
-    t = [b + (b - a) / 3 for a, b in zip(u, u[1:], strict=False)]
-    print("changes of the extrapolated fields\n", np.array([np.abs(b - a).max(axis=1) for a, b in zip(t, t[1:], strict=False)]))
+    t = [b + (b - a) / 3 for a, b in pairwise(u)]
+    print("changes of the extrapolated fields\n", np.array([np.abs(b - a).max(axis=1) for a, b in pairwise(t)]))
 
     field = solve(untwisting_rod(), 1e-5, progress=False)
     a, b, c = chains("springs", (513, 1025, 2049))
@@ -58,5 +61,32 @@ def main() -> None:
           f"least {run.energy.min():.2f} of {run.energy[0]:.2f}")  # fmt: skip
 
 
+def peers() -> None:
+    """Medians of five runs, after one to warm up, of Exudyn and of ours with the same step; skipped without exudyn."""
+    try:
+        from compare.peers.exudyn_chain import exudyn_steered
+    except ImportError:
+        print("exudyn is not installed (extra [peers])")
+        return
+    for n in (2, 8, 32, 128):
+        problem = lump(steered_rod(), n)
+        reference = simulate(problem, FINE, 0.005, frames=1, progress=False)
+        found = []
+        for run in (
+            lambda p: simulate(p, "midpoint", 0.01, frames=2, progress=False),
+            lambda p: exudyn_steered(p, 0.01),
+        ):
+            times = []
+            for _ in range(6):
+                start = clock.perf_counter()
+                end = run(problem)
+                times.append(clock.perf_counter() - start)
+            error = max(np.abs(getattr(end, name)[-1] - getattr(reference, name)[-1]).max() for name in (*FIELDS, "phi"))
+            found.append((np.median(times[1:]), error))
+        (ours, a), (theirs, b) = found
+        print(f"N = {n}, h = 0.01: ours {ours:.3f} s ({a:.1e}), Exudyn {theirs:.3f} s ({b:.1e}), Exudyn / ours {theirs / ours:.2f}")
+
+
 if __name__ == "__main__":
     main()
+    peers()
