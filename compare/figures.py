@@ -86,6 +86,8 @@ def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
         ax: Axes3D = figure.add_subplot(rows, columns, f + 1, projection="3d")
         tangent = np.gradient(np.stack([x, y]), axis=1)[:, : run.s.size]
         tangent /= np.hypot(*tangent)
+        if run.phi is not None:  # a section's own heading
+            tangent = np.array([np.cos(run.phi[f]), np.sin(run.phi[f])])
         sine, cosine = np.sin(run.theta[f]), np.cos(run.theta[f])
         d3 = np.array([-tangent[1] * sine, tangent[0] * sine, cosine])[:, shown]
         ax.plot(x, y, 0, color=BLUE, linewidth=2)

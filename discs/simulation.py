@@ -14,7 +14,11 @@ from discs.integrators import Integrator, Work, find
 from discs.problem import Problem
 from discs.solution import Solution
 
-WANTS = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y")}
+WANTS = {
+    "velocity": ("x_rate", "y_rate"),
+    "slope": ("slope_x", "slope_y"),
+    "contact_force": ("contact_force",),
+}
 
 
 class SimulationError(RuntimeError):
@@ -51,7 +55,7 @@ def simulate(
     dt : time step; None takes `suggest_dt(problem, method)`.
     frames : how many frames, equally spaced over the duration, or their times, increasing. A frame between two steps is
         reached by a shorter step of its own, so asking for frames never changes the trajectory.
-    want : what else to record: "velocity", "slope", and what the method offers (leapfrog: "modified_energy").
+    want : what else to record: "velocity", "slope", "contact_force", and what the method offers (leapfrog: "modified_energy").
     progress : show a progress bar on anything that takes over a second.
 
     Returns
@@ -78,6 +82,8 @@ def simulate(
 
     rows: dict[str, Any] = {name: np.empty((len(times), n)) for name in (*system.rows, "omega")}
     rows |= {name: np.empty((len(times), n)) for w in want if w in WANTS for name in WANTS[w]}
+    if "contact_force" in want:
+        rows["contact_force"] = np.empty((len(times), 2, n))
     if "velocity" in want and "phi" in system.rows:
         rows["phi_rate"] = np.empty((len(times), n))
     rows |= {name: np.empty(len(times)) for name in ("energy", "rolling_residual")}
@@ -103,6 +109,8 @@ def simulate(
                 rows["phi_rate"][f] = frame.rate[3]
         if "slope" in want:
             rows["slope_x"][f], rows["slope_y"][f] = system.slope(shape)
+        if "contact_force" in want:
+            rows["contact_force"][f] = system.contact_force(shape, frame.rate)
         for name, value in integrator.extras(system, memory, h).items() if offered else ():
             rows[name][f] = value
 

@@ -90,6 +90,14 @@ class SlavedSystem(SkewGradient):
         np.negative(e[0], out=e[0])
         return e
 
+    def contact_rate(self, shape: NDArray, v: NDArray) -> NDArray:
+        turning = self.slope(stencils.links(v, self._ends))
+        if self._unit:  # of r'/|r'|: the part of the rate across r', over |r'|
+            slope = self.slope(shape)
+            square = (slope * slope).sum(axis=0)
+            turning = (turning - slope * ((slope * turning).sum(axis=0) / square)) / np.sqrt(square)
+        return self._radius * np.array([-turning[1], turning[0]])
+
     def inertia(self, e: NDArray) -> NDArray:
         """Inertia m = w (alpha + rho |e|**2) of each disc against rolling, (n,)."""
         return self.weights[2] + self.weights[0] * (e[0] ** 2 + e[1] ** 2)

@@ -100,6 +100,9 @@ class SteeredSystem(SkewGradient):
     def contact(self, shape: Links) -> NDArray:
         return self._radius * np.array([-np.sin(shape.phi), np.cos(shape.phi)])
 
+    def contact_rate(self, shape: Links, v: NDArray) -> NDArray:
+        return -self._radius * v[3] * self.slope(shape)
+
     def frame(self, shape: Links) -> NDArray:
         c = np.empty((4, self.n))
         c[2:] = 1 / self._roots

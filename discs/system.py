@@ -78,6 +78,10 @@ class SkewGradient(ABC):
         """Contact directions e, (2, n): a disc moves by e per unit of roll. Length per rad."""
 
     @abstractmethod
+    def contact_rate(self, shape: Any, v: NDArray) -> NDArray:
+        """Rates of the contact directions, e., (2, n), for rates v (rows, n) of the coordinates. Length per time."""
+
+    @abstractmethod
     def frame(self, shape: Any) -> NDArray:
         """The entries of C, (rows, n)."""
 
@@ -126,6 +130,18 @@ class SkewGradient(ABC):
     def gradient(self, shape: Any) -> NDArray:
         """grad V, (rows, n)."""
         return self.mean_force(self.secant(shape, self._no_step))
+
+    def contact_force(self, shape: Any, v: NDArray) -> NDArray:
+        """Force lambda of the ground on each disc, (2, n), for admissible rates v (rows, n).
+
+        From rho w r.. = -dV/dr + lambda with r.. = e omega. + e. omega, and
+        w (alpha + rho |e|^2) omega. = -e . dV/dr - dV/dtheta - rho w omega e . e. .
+        """
+        gradient, mass, omega = self.gradient(shape), self.weights[0], v[2]
+        e, turning = self.contact(shape), self.contact_rate(shape, v)
+        inertia = self.weights[2] + mass * (e * e).sum(axis=0)
+        torque = -(e * gradient[:2]).sum(axis=0) - gradient[2] - mass * omega * (e * turning).sum(axis=0)
+        return mass * (e * (torque / inertia) + turning * omega) + gradient[:2]
 
     @cached_property
     def _no_step(self) -> NDArray:

@@ -10,7 +10,7 @@ from continuum import breathing_ring, untwisting_rod
 from continuum.mesh import semidiscretise
 from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, Suzuki4, simulate, suggest_dt
 from discs.integrators import METHODS
-from tests.conftest import Model, uneven
+from tests.conftest import Model, models, uneven
 
 PARAMETERS = {
     "n": 8,
@@ -143,8 +143,8 @@ def test_bad_chains_are_refused(change, message):
         ({"frames": 0}, "frames must be a whole number of at least 1"),
         ({"frames": [0.5, 0.2]}, "increasing times within"),
         ({"frames": [0.5, 1.2]}, "increasing times within"),
-        ({"want": ("colour",)}, "want must be one of 'velocity', 'slope'; got 'colour'"),
-        ({"want": "modified_energy"}, "want must be one of 'velocity', 'slope'; got 'modified_energy'"),
+        ({"want": ("colour",)}, "want must be one of 'velocity', 'slope', 'contact_force'; got 'colour'"),
+        ({"want": "modified_energy"}, "want must be one of 'velocity', 'slope', 'contact_force'; got 'modified_energy'"),
     ],
 )
 def test_bad_runs_are_refused(arguments, message):
@@ -245,3 +245,18 @@ def test_wrong_kinds_are_refused():
         simulate(uneven(7, Model("springs", "field")), frames=["a"])
     with pytest.raises(ValueError, match="base must be a Midpoint; got 'midpoint'"):
         Suzuki4("midpoint")
+
+
+@models([Model("consistent", "unit"), Model("ring", "field"), Model("springs", "true"), Model("springs", "steered")])
+@pytest.mark.parametrize("name", METHODS)
+def test_ground_force_along_a_run(name, model):
+    """lambda = rho w r.. + dV/dr, r.. by differences of the recorded velocity: second order in the frames' spacing."""
+    problem = uneven(7, model)
+    times = np.array([0.5 - 1e-3, 0.5, 0.5 + 1e-3])
+    run = simulate(problem, name, 0.0025, frames=times, want=("contact_force", "velocity"), progress=False)
+    system = problem.system
+    q = np.stack([getattr(run, row)[1] for row in system.rows])
+    mass, gradient = system.weights[0], system.gradient(system.shape(q))
+    rate = np.stack([run.x_rate, run.y_rate], axis=1)
+    expected = mass * (rate[2] - rate[0]) / 2e-3 + gradient[:2]
+    np.testing.assert_allclose(run.contact_force[1], expected, atol=2e-4 * np.abs(expected).max())

@@ -108,7 +108,10 @@ def test_skew_gradient_form_is_lagrange_d_alembert(model, sign):
     forces[2 * n : 3 * n] *= sign
     saddle = np.block([[np.diag(system.weights.ravel()), -forces], [a, np.zeros((2 * n, 2 * n))]])
     rhs = np.concatenate([-system.gradient(shape).ravel(), (turned * omega).ravel()])
-    acceleration = np.linalg.solve(saddle, rhs)[2 * n : rows * n]
+    unknowns = np.linalg.solve(saddle, rhs)
+    acceleration, multipliers = unknowns[2 * n : rows * n], unknowns[rows * n :].reshape(2, n)
+    ground = system.contact_force(shape, velocity)
+    slip = np.abs(multipliers - ground).max() / np.abs(ground).max()
     # pi = root rate, root^2 the inertia: rate. = (pi. - root. rate)/root
     rates = velocity[2:]
 
@@ -120,7 +123,12 @@ def test_skew_gradient_form_is_lagrange_d_alembert(model, sign):
     difference = np.abs(acceleration - reduced.ravel()).max() / np.abs(reduced).max()
     if sign == 1:
         assert difference < 1e-8  # central differences with step 1e-6
+        assert slip < 1e-8
+        # the ground does no work: its force on r and its torque -e.lambda on theta, on the actual motion
+        power = (ground * velocity[:2]).sum(axis=0) - (e * ground).sum(axis=0) * omega
+        assert np.abs(power).max() < 1e-12
     else:
+        assert slip > 1e-2
         assert difference > 1e-2
 
 
