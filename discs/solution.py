@@ -27,8 +27,8 @@ class Solution:
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
     phi_rate : (F, N), rates of turning, rad per time; want "velocity", own headings.
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
-    contact_force : (F, 2, N), force (x, y) of the ground that keeps each disc rolling, the multiplier lambda, mass times length per time
-        squared; want "contact_force".
+    contact_force : (F, 2, N), force (x, y) of the ground that keeps each disc rolling, the multiplier lambda, mass times length
+        per time squared; want "contact_force".
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
     error_estimate : for a field, {"x", "y", "theta", "omega"} -> estimated largest error over nodes and frames.
     """
