@@ -11,14 +11,12 @@ from tqdm import tqdm
 
 from discs import checks
 from discs.integrators import Integrator, Work, find
+from discs.integrators.base import Frame
 from discs.problem import Problem
 from discs.solution import Solution
+from discs.system import SkewGradient
 
-WANTS = {
-    "velocity": ("x_rate", "y_rate"),
-    "slope": ("slope_x", "slope_y"),
-    "contact_force": ("contact_force",),
-}
+WANTS = ("velocity", "slope", "contact_force")
 
 
 class SimulationError(RuntimeError):
@@ -75,44 +73,14 @@ def simulate(
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     times = frame_times(frames, problem.duration)
-    system, n = problem.system, problem.chain.n
+    system = problem.system
     # the number of whole steps before a frame; a frame within rounding of a step is taken at the step
     before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
     after = np.where(times - before * h > 1e-9 * h, times - before * h, 0.0)
 
-    rows: dict[str, Any] = {name: np.empty((len(times), n)) for name in (*system.rows, "omega")}
-    rows |= {name: np.empty((len(times), n)) for w in want if w in WANTS for name in WANTS[w]}
-    if "contact_force" in want:
-        rows["contact_force"] = np.empty((len(times), 2, n))
-    if "velocity" in want and "phi" in system.rows:
-        rows["phi_rate"] = np.empty((len(times), n))
-    rows |= {name: np.empty(len(times)) for name in ("energy", "rolling_residual")}
-    offered = [name for name in want if name in integrator.offers]
-    if offered and not system.quadratic:
-        raise ValueError(f"{offered[0]} needs a quadratic potential, which this chain has not")
-    rows |= {name: np.empty(len(times)) for name in offered}
-
-    def record(f: int) -> None:
-        frame = integrator.at(system, memory, after[f], h, work)
-        if after[f]:
-            watch.check(system.kinetic(frame.rate), memory, frame, step, times[f])
-        shape = system.shape(frame.hi, frame.lo)
-        slip = frame.rate[:2] - system.contact(shape) * frame.rate[2]
-        for name, values in zip(system.rows, frame.hi + frame.lo, strict=True):
-            rows[name][f] = values
-        rows["omega"][f] = frame.rate[2]
-        rows["energy"][f] = system.kinetic(frame.rate) + system.potential(shape)
-        rows["rolling_residual"][f] = np.hypot(*slip).max()
-        if "velocity" in want:
-            rows["x_rate"][f], rows["y_rate"][f] = frame.rate[:2]
-            if "phi" in system.rows:
-                rows["phi_rate"][f] = frame.rate[3]
-        if "slope" in want:
-            rows["slope_x"][f], rows["slope_y"][f] = system.slope(shape)
-        if "contact_force" in want:
-            rows["contact_force"][f] = system.contact_force(shape, frame.rate)
-        for name, value in integrator.extras(system, memory, h).items() if offered else ():
-            rows[name][f] = value
+    if set(want) & set(integrator.offers) and not system.quadratic:
+        raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
+    rows: dict[str, Any] = {}
 
     started = clock.perf_counter()
     work = Work()
@@ -127,7 +95,12 @@ def simulate(
                     step += 1
                     bar.update()
                     watch.check(integrator.kinetic(system, memory, h), previous, memory, step, step * h)
-                record(f)
+                frame = integrator.at(system, memory, after[f], h, work)
+                if after[f]:
+                    watch.check(system.kinetic(frame.rate), memory, frame, step, times[f])
+                extras = integrator.extras(system, memory, h) if set(want) & set(integrator.offers) else {}
+                for name, value in (_quantities(system, frame, want) | extras).items():
+                    rows.setdefault(name, np.empty((len(times), *np.shape(value))))[f] = value
     stats = {
         "method": integrator.name,
         "order": integrator.order,
@@ -138,6 +111,25 @@ def simulate(
         "seconds": clock.perf_counter() - started,
     }
     return Solution(t=times, s=problem.chain.s, stats=stats, **rows)
+
+
+def _quantities(system: SkewGradient, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:
+    """What a frame records, by the names that `Solution` has for it."""
+    shape, rate = system.shape(frame.hi, frame.lo), frame.rate
+    slip = rate[:2] - system.contact(shape) * rate[2]
+    found: dict[str, Any] = dict(zip(system.rows, frame.hi + frame.lo, strict=True))
+    found |= {
+        "omega": rate[2],
+        "energy": system.kinetic(rate) + system.potential(shape),
+        "rolling_residual": np.hypot(*slip).max(),
+    }
+    if "velocity" in want:
+        found |= {f"{name}_rate": rate[row] for row, name in enumerate(system.rows) if name != "theta"}
+    if "slope" in want:
+        found |= dict(zip(("slope_x", "slope_y"), system.slope(shape), strict=True))
+    if "contact_force" in want:
+        found["contact_force"] = system.contact_force(shape, rate)
+    return found
 
 
 class _Watch:
