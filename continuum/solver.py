@@ -16,6 +16,7 @@ from discs.simulation import frame_times
 FIELDS = ("x", "y", "theta", "omega")
 COARSEST = 33
 FINEST = 8193
+MOST_STEPS = 25 * 2**12
 
 
 def solve(
@@ -57,7 +58,8 @@ def solve(
 
     Raises
     ------
-    ValueError : for a bad tolerance, method or mesh, and when the tolerance is not reached on the finest mesh, 8193 nodes.
+    ValueError : for a bad tolerance, method or mesh, and when the tolerance is not reached on the finest mesh, 8193 nodes, or in
+        102 400 time steps.
     SimulationError : when the motion cannot go on; see `discs.simulate`.
     """
     if method is None:
@@ -66,7 +68,8 @@ def solve(
     if method == "leapfrog":
         problem = semidiscretise(scene, 32 if n is None else n, ends="paper")
         step = min(problem.chain.k**2 / 8, suggest_dt(problem, "leapfrog")) if dt is None else dt
-        return simulate(problem, "leapfrog", dt=step, frames=frames, want=("modified_energy",), progress=progress)
+        want = ("modified_energy",) if problem.system.quadratic else ()
+        return simulate(problem, "leapfrog", dt=step, frames=frames, want=want, progress=progress)
     if n is not None or dt is not None:
         raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
     if scene.steered:
@@ -93,6 +96,11 @@ def _richardson(scene: Scene, tol: float, frames: int | ArrayLike, progress: boo
     with tqdm(desc=f"field to {tol:g}", unit="run", delay=1, disable=not progress) as bar:
 
         def shown(n: int, steps: int) -> Solution:
+            if steps > MOST_STEPS:
+                raise ValueError(
+                    f"tol = {tol:g} is not reached in {MOST_STEPS} time steps: the motion is too sensitive or too fast; "
+                    "ask for a larger tol or a shorter duration"
+                )
             bar.set_postfix(nodes=n, steps=steps, refresh=False)
             bar.update()
             return run(n, steps)

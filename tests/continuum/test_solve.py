@@ -128,6 +128,18 @@ def test_unreachable_tolerance_is_refused(monkeypatch):
         solve(untwisting_rod(), 1e-6, progress=False)
 
 
+def test_motion_too_sensitive_for_its_tolerance(monkeypatch):
+    monkeypatch.setattr("continuum.solver.MOST_STEPS", 100)
+    with pytest.raises(ValueError, match=r"tol = 1e-07 is not reached in 100 time steps.*larger tol or a shorter duration"):
+        solve(untwisting_rod(), 1e-7, progress=False)
+
+
+def test_explicit_scheme_of_the_true_curvature():
+    run = solve(untwisting_rod("unit", curvature="true", duration=1.0), method="leapfrog", progress=False)
+    assert run.modified_energy is None
+    assert run.energy == pytest.approx(run.energy[0], rel=1e-3)
+
+
 def test_blow_up_of_the_explicit_scheme():
     with pytest.raises(SimulationError, match="stability limit of 'leapfrog'"):
         solve(untwisting_rod(), method="leapfrog", dt=0.02, progress=False)
