@@ -29,6 +29,7 @@ from discs import Solution
 
 DEGREE = 10
 MOST = 256
+UNKNOWNS = ("x", "y", "theta", "phi", "omega", "phi_rate")
 
 
 def lobatto(p: int) -> tuple[NDArray, NDArray, NDArray]:
@@ -51,7 +52,7 @@ def lobatto(p: int) -> tuple[NDArray, NDArray, NDArray]:
 class Elements:
     """A scene of a `SteeredRod` on `count` equal elements of degree `DEGREE`.
 
-    Unknowns are rows (6, n): x, y, theta, phi, theta., phi. at the n nodes; a closed rod's last node is its first.
+    Unknowns are rows (6, n), named by UNKNOWNS, at the n nodes; a closed rod's last node is its first.
     """
 
     scene: Scene
@@ -147,8 +148,8 @@ class Elements:
 
     def run(self, times: NDArray, tol: float) -> NDArray:
         """The unknowns at the times, (F, 6, n), with an error in time below tol."""
-        x, y, theta, omega, phi, phi_rate = np.broadcast_arrays(*self.scene.initial(self.s))
-        start = np.stack([x, y, theta, phi, omega, phi_rate])
+        fields = self.scene.fields(self.s)
+        start = np.stack([fields[name] for name in UNKNOWNS])
         span = 0.0, max(float(times[-1]), 1e-300)
         found = solve_ivp(self.rate, span, start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
         if not found.success:
@@ -193,12 +194,11 @@ def solve_elements(scene: Scene, tol: float, times: NDArray, progress: bool) -> 
         else:
             error = change[:4].max()
             raise ValueError(f"tol = {tol:g} is not reached on {system.n} nodes: estimated error {error:.1e}; ask for a larger tol")
-    names = ("x", "y", "theta", "phi", "omega", "phi_rate")
     return Solution(
         t=times,
         s=scene.rod.length / (system.count * cells) * np.arange(values.shape[-1]),
         energy=np.array([system.energy(q) for q in fine]),
         stats={"method": "elements", "order": DEGREE, "elements": system.count, "nodes": system.n, "dt": None},
-        error_estimate=dict(zip(names, change.tolist(), strict=True)),
-        **dict(zip(names, values, strict=True)),
+        error_estimate=dict(zip(UNKNOWNS, change.tolist(), strict=True)),
+        **dict(zip(UNKNOWNS, values, strict=True)),
     )

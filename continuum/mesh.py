@@ -32,9 +32,4 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
         chain = SteeredChain(**common, **beams, turns=scene.turns)
     else:
         chain = Chain(**common, rolling=scene.rolling, curvature=rod.curvature)
-    fields = scene.initial(chain.s)
-    names = ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if scene.steered else 4]
-    if not isinstance(fields, tuple) or len(fields) != len(names):
-        given = f"{len(fields)} of them" if isinstance(fields, tuple) else type(fields).__name__
-        raise ValueError(f"the scene's initial fields must be the tuple {', '.join(names)}; got {given}")
-    return Problem(chain, State(**dict(zip(names, fields, strict=True))), scene.duration)
+    return Problem(chain, State(**scene.fields(chain.s)), scene.duration)

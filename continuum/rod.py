@@ -136,6 +136,15 @@ class Scene:
             raise ValueError(f"shift belongs to a closed rod; got shift={self.shift} with closed=False")
         object.__setattr__(self, "shift", tuple(np.asarray(shift).tolist()))
 
+    def fields(self, s: NDArray) -> dict[str, NDArray]:
+        """The initial fields at places s (n,) by name, each (n,); ValueError if `initial` returns other than it should."""
+        names = ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if self.steered else 4]
+        values = self.initial(s)
+        if not isinstance(values, tuple) or len(values) != len(names):
+            given = f"{len(values)} of them" if isinstance(values, tuple) else type(values).__name__
+            raise ValueError(f"the scene's initial fields must be the tuple {', '.join(names)}; got {given}")
+        return {name: checks.field(f"initial {name}", value, s.size) for name, value in zip(names, values, strict=True)}
+
     @property
     def steered(self) -> bool:
         """Whether sections have headings of their own."""

@@ -17,8 +17,6 @@ PAPER = {
     "bending_stiffness": 0.7,
     "radius": 1.0,
 }
-
-
 LAW = ("curvature", "stretch_stiffness")
 
 

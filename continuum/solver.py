@@ -135,13 +135,10 @@ def _richardson(scene: Scene, tol: float, frames: int | ArrayLike, progress: boo
 def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:
     """T = u_{k/2} + (u_{k/2} - u_k)/3 on the finer nodes, the correction between the coarser ones by a cubic spline."""
     changed = {}
-    for name in (*FIELDS, "energy"):
+    for name in FIELDS:
         u, v = getattr(fine, name), getattr(coarse, name)
-        if name == "energy":
-            changed[name] = u + (u - v) / 3
-            continue
         changed[name] = u + spline(scene, coarse.s, (u[:, ::2] - v) / 3)(fine.s).T
-    return replace(fine, **changed)
+    return replace(fine, energy=fine.energy + (fine.energy - coarse.energy) / 3, **changed)
 
 
 def spline(scene: Scene, s: NDArray, values: NDArray) -> CubicSpline:

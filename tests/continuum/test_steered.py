@@ -180,5 +180,9 @@ def test_bad_steered_rods_are_refused():
         replace(steered_rod(), rolling="field")
     with pytest.raises(ValueError, match=r"ends \(own headings\) must be one of 'springs', 'ring'; got 'consistent'"):
         lump(steered_rod(), 33, ends="consistent")
+    four = replace(steered_rod(), initial=untwisting_rod().initial)
+    for compute in (lambda: solve(four, progress=False), lambda: lump(four, 9)):
+        with pytest.raises(ValueError, match="must be the tuple x, y, theta, omega, phi, phi_rate; got 4 of them"):
+            compute()
     with pytest.raises(ValueError, match="method must be one of 'elements'; got 'leapfrog'"):
         solve(steered_rod(), method="leapfrog")
