@@ -15,6 +15,7 @@ test: .venv/test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python -m discs.kernels
 	$(BIN)/pytest
 
 .venv/made:

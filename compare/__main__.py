@@ -3,12 +3,20 @@
 import argparse
 import sys
 
+from compare import precision
 from compare.background import background
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
-from continuum import untwisting_rod
+from compare.outputs import fresh_files
+from continuum import steered_rod, untwisting_rod
 from continuum.files import read_scene
 from discs import SimulationError
+
+LAWS = {
+    "field": untwisting_rod,
+    "unit": lambda: untwisting_rod(rolling="unit"),
+    "own": lambda: steered_rod(stretch_stiffness=10, shear_stiffness=10, heading_inertia=0.25),
+}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -29,13 +37,50 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--tol", metavar="TOL", type=float, default=1e-5, help="largest error of the field (default: 1e-5)")
     p.add_argument("--no-limits", action="store_true", help="of the default scene, leave out the discs with headings of their own")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
+    commands = p.add_subparsers(dest="command", metavar="COMMAND", title="commands (without one: the comparison above)")
+    add_precision(
+        commands.add_parser("precision", help="speed against error beside other integrators", description=precision.__doc__)
+    )
     return p
+
+
+def add_precision(p: argparse.ArgumentParser) -> None:
+    """The options of `precision`."""
+    p.add_argument(
+        "--out", metavar="DIR", default="out", help="folder for precision.csv, precision.png, precision.md (default: out)"
+    )
+    p.add_argument(
+        "--n", metavar="N", type=int, nargs="+", default=list(precision.SIZES), help="numbers of discs (default: 32 ... 2048)"
+    )
+    p.add_argument(
+        "--laws", metavar="LAW", nargs="+", choices=LAWS, default=list(LAWS), help=f"of {', '.join(LAWS)} (default: all)"
+    )
+    p.add_argument("--repeats", metavar="M", type=int, default=5, help="timed runs of each setting (default: 5)")
+    p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run (default: 10)")
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
+
+
+def run_precision(options: argparse.Namespace) -> None:
+    """Measure speed against error and write table and picture."""
+    with fresh_files(options.out) as folder:
+        scenes = {law: LAWS[law]() for law in options.laws}
+        found = precision.work_precision(
+            scenes, tuple(options.n), repeats=options.repeats, seconds=options.seconds, progress=not options.quiet
+        )
+        found.save(folder / "precision.csv")
+        found.plot(folder / "precision.png")
+        (folder / "precision.md").write_text(found.report(), encoding="utf-8")
+    print(found.report())
+    print(f"\nwritten to {options.out}: precision.csv, precision.png, precision.md")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
     options = parser().parse_args(arguments)
     try:
+        if options.command == "precision":
+            run_precision(options)
+            return 0
         if options.scene and options.rolling:
             raise ValueError("--rolling belongs to the default scene; a scene file says its own law with the key 'rolling'")
         scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")

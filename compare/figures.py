@@ -15,6 +15,7 @@ from continuum import Scene
 from discs import Solution
 
 if TYPE_CHECKING:
+    from compare.precision import WorkPrecision
     from compare.study import Study
 
 # Okabe and Ito's colours, distinct for colour-blind readers
@@ -132,3 +133,40 @@ def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
     ax.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     ax.grid(alpha=0.3)
     return ax
+
+
+OURS = {"midpoint": BLUE, "suzuki4": ORANGE, "gauss6": GREEN, "gauss8": PURPLE, "auto": "black"}
+
+
+def precision(study: "WorkPrecision") -> list[Axes]:
+    """Error against time, log-log, a row of panels for each number of discs: our methods in colour, peers in grey, each with
+    its mark."""
+    names = list(dict.fromkeys(name for name, _ in study.problems))
+    sizes = list(dict.fromkeys(n for _, n in study.problems))
+    peers = list(dict.fromkeys(r.method for r in study.rows if not r.ours))
+    marks = dict(zip(peers, ("s", "D", "^", "v", "<", ">", "p", "*", "h", "X", "P", "d", "8", "H", "1", "2"), strict=False))
+    figure = Figure(figsize=(1.0 + 3.9 * len(names), 1.2 + 3.1 * len(sizes)), layout="constrained")
+    grid = figure.subplots(len(sizes), len(names), squeeze=False, sharex=True, sharey=True)
+    shown: dict[str, Any] = {}
+    for (row, n), (column, name) in ((a, b) for a in enumerate(sizes) for b in enumerate(names)):
+        ax = grid[row, column]
+        for method in (*peers, *OURS):
+            errors, seconds = study.curve(name, n, method)
+            if not errors.size:
+                continue
+            if method in OURS:
+                line = ax.loglog(seconds, errors, "o-", color=OURS[method], markersize=4, linewidth=1.6, zorder=3)[0]
+            else:
+                line = ax.loglog(
+                    seconds, errors, marks.get(method, "."), linestyle="-", color="#999999", markersize=4, linewidth=0.8
+                )[0]
+            shown.setdefault(method, line)
+        ax.set_title(f"{name}, N = {n}", fontsize="medium")
+        ax.grid(alpha=0.3)
+        if row == len(sizes) - 1:
+            ax.set_xlabel("wall time (s)")
+        if column == 0:
+            ax.set_ylabel("relative error of x, y, θ")
+    order = [m for m in (*OURS, *peers) if m in shown]
+    figure.legend([shown[m] for m in order], order, loc="outside lower center", ncols=5, fontsize="small", frameon=False)
+    return list(grid.ravel())

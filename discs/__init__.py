@@ -1,16 +1,22 @@
 """N rolling discs joined by springs: a finite-dimensional nonholonomic mechanical system."""
 
 from discs.chain import Chain, SteeredChain
-from discs.integrators import RK4, Integrator, Leapfrog, Midpoint, Suzuki4
+from discs.integrators import RK4, Gauss4, Gauss6, Gauss8, Integrator, KahanLi6, Leapfrog, McLachlanPerlmutter, Midpoint, Suzuki4
+from discs.marching import SimulationError
 from discs.problem import Problem, State
-from discs.simulation import SimulationError, simulate, suggest_dt
+from discs.simulation import simulate, suggest_dt
 from discs.solution import Solution
 
 __all__ = [
     "RK4",
     "Chain",
+    "Gauss4",
+    "Gauss6",
+    "Gauss8",
     "Integrator",
+    "KahanLi6",
     "Leapfrog",
+    "McLachlanPerlmutter",
     "Midpoint",
     "Problem",
     "SimulationError",

@@ -56,3 +56,10 @@ def field(name: str, value: ArrayLike, size: int, *, least: float | None = None,
         raise ValueError(f"{name} must be {need}; got {given[i]} at place {i}")
     given.flags.writeable = False
     return given
+
+
+def iteration(sweeps: object, tolerance: object) -> None:
+    """Check the limits of an iteration: at least one sweep, a tolerance that is not negative."""
+    whole("sweeps", sweeps, 1)
+    if number("tolerance", tolerance) < 0:
+        raise ValueError(f"tolerance must be at least 0; got {tolerance!r}")

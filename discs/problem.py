@@ -95,13 +95,19 @@ class Problem:
 
     def start(self) -> Phase:
         """The initial state in the variables (q, pi) of the skew-gradient form."""
+        return self._start
+
+    @cached_property
+    def _start(self) -> Phase:
         q = self._positions()
         rates = np.array([self.initial.omega, self.initial.phi_rate])
         return Phase(q, np.zeros_like(q), self.system.momentum(self.system.shape(q), rates))
 
     def energy(self, state: State | None = None) -> float:
         """Kinetic and potential energy of a state, the initial one by default."""
-        if state is not None:
-            return Problem(self.chain, state, self.duration).energy()
+        return self._energy if state is None else Problem(self.chain, state, self.duration)._energy
+
+    @cached_property
+    def _energy(self) -> float:
         z = self.start()
         return 0.5 * float(np.vdot(z.pi, z.pi)) + self.system.potential(self.system.shape(z.hi, z.lo))

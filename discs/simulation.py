@@ -10,29 +10,16 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from tqdm import tqdm
 
 from discs import checks
-from discs.integrators import Integrator, Work, find
+from discs.integrators import Integrator, find
 from discs.integrators.base import Frame
+from discs.marching import March
 from discs.problem import Problem
 from discs.solution import Solution
 from discs.system import SkewGradient
+from discs.tolerance import to_tolerance
 
 WANTS = ("velocity", "slope", "contact_force")
-
-
-class SimulationError(RuntimeError):
-    """A run that could not go on.
-
-    Attributes
-    ----------
-    step, time, disc : where it stopped.
-    """
-
-    def __init__(self, message: str, step: int, time: float, disc: int) -> None:
-        super().__init__(f"{message} (step {step}, time {time:g}, disc {disc})")
-        self.message, self.step, self.time, self.disc = message, step, time, disc
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.message, self.step, self.time, self.disc)
+ENGINES = ("compiled", "plain")
 
 
 def simulate(
@@ -42,19 +29,25 @@ def simulate(
     frames: int | ArrayLike = 101,
     want: Iterable[str] = (),
     progress: bool = True,
+    engine: str = "compiled",
+    tol: float | None = None,
 ) -> Solution:
     """Run a problem.
 
     Parameters
     ----------
     problem : what to compute.
-    method : name of an integrator ("midpoint", "suzuki4", "rk4", "leapfrog"), or one with its own settings, as
-        `Midpoint(sweeps=2)`.
-    dt : time step; None takes `suggest_dt(problem, method)`.
+    method : name of an integrator (`discs.integrators.METHODS`; docs/choosing.md says which when), one with its own settings, as
+        `Midpoint(sweeps=2)`, or "auto".
+    dt : time step, for SciPy's methods the longest; None takes `suggest_dt(problem, method)`.
     frames : how many frames, equally spaced over the duration, or their times, increasing. A frame between two steps is
         reached by a shorter step of its own, so asking for frames never changes the trajectory.
     want : what else to record: "velocity", "slope", "contact_force", and what the method offers (leapfrog: "modified_energy").
     progress : show a progress bar on anything that takes over a second.
+    tol : instead of dt: runs with smaller and smaller steps until x, y, theta (and phi) are within this, relative to the
+    largest value of
+        each; see `discs.tolerance`. method="auto" chooses the method too, and takes 1e-3 if it is not given.
+    engine : "compiled", or "plain" for the same in NumPy and SciPy. Discs with true curvature have only the plain form.
 
     Returns
     -------
@@ -68,61 +61,64 @@ def simulate(
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
+    if method == "auto" or tol is not None:
+        if dt is not None:
+            raise ValueError("give dt or tol, not both: tol (and method='auto') finds the step")
+
+        def run(integrator: Integrator, dt: float, times: NDArray) -> Solution:
+            return simulate(problem, integrator, dt, times, want, progress, engine)
+
+        times = frame_times(frames, problem.duration)
+        first = suggest_dt(problem, "midpoint" if method == "auto" else method)
+        return to_tolerance(problem, method, 1e-3 if tol is None else tol, times, max(first, problem.duration / 20), run)
     integrator = find(method)
     want = _wanted(want, integrator)
+    compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     times = frame_times(frames, problem.duration)
     system = problem.system
+    offered = set(want) & set(integrator.offers)
+    if offered and not system.quadratic:
+        raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
     # the number of whole steps before a frame; a frame within rounding of a step is taken at the step
     before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
     after = np.where(times - before * h > 1e-9 * h, times - before * h, 0.0)
 
-    if set(want) & set(integrator.offers) and not system.quadratic:
-        raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
     rows: dict[str, Any] = {}
-
     started = clock.perf_counter()
-    work = Work()
-    watch = _Watch(problem, integrator, h)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        memory: Any = integrator.begin(system, problem.start(), h, work)
-        step = 0
-        with tqdm(total=int(before[-1]), desc=integrator.name, unit="step", delay=1, disable=not progress) as bar:
-            for f, last in enumerate(before):
-                while step < last:
-                    previous, memory = memory, integrator.advance(system, memory, h, work)
-                    step += 1
-                    bar.update()
-                    watch.check(integrator.kinetic(system, memory, h), previous, memory, step, step * h)
-                frame = integrator.at(system, memory, after[f], h, work)
-                if after[f]:
-                    watch.check(system.kinetic(frame.rate), memory, frame, step, times[f])
-                extras = integrator.extras(system, memory, h) if set(want) & set(integrator.offers) else {}
-                for name, value in (_quantities(system, frame, want) | extras).items():
-                    rows.setdefault(name, np.empty((len(times), *np.shape(value))))[f] = value
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), Progress(integrator.name, before[-1], progress) as shown:
+        march = March(problem, integrator, h, compiled, quiet=not progress)
+        for f, last in enumerate(before):
+            for taken in march.to(last):
+                shown.update(taken)
+            frame = march.frame(after[f])
+            found = march.observe(frame)
+            if want:
+                found |= _extras(system, frame, want)
+            if offered:
+                found |= integrator.extras(system, march.memory, h)
+            for name, value in found.items():
+                if name not in rows:
+                    rows[name] = np.empty((len(times), *np.shape(value)))
+                rows[name][f] = value
     stats = {
         "method": integrator.name,
         "order": integrator.order,
+        "engine": "compiled" if compiled else "plain",
         "dt": h,
         "dt_suggested": suggested,
-        "steps": step,
-        **vars(work),
+        "steps": march.step,
+        **vars(march.work),
         "seconds": clock.perf_counter() - started,
     }
     return Solution(t=times, s=problem.chain.s, stats=stats, **rows)
 
 
-def _quantities(system: SkewGradient, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:
-    """What a frame records, by the names that `Solution` has for it."""
+def _extras(system: SkewGradient, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:
+    """What a frame records only when asked to."""
     shape, rate = system.shape(frame.hi, frame.lo), frame.rate
-    slip = rate[:2] - system.contact(shape) * rate[2]
-    found: dict[str, Any] = dict(zip(system.rows, frame.hi + frame.lo, strict=True))
-    found |= {
-        "omega": rate[2],
-        "energy": system.kinetic(rate) + system.potential(shape),
-        "rolling_residual": np.hypot(*slip).max(),
-    }
+    found: dict[str, Any] = {}
     if "velocity" in want:
         found |= {f"{name}_rate": rate[row] for row, name in enumerate(system.rows) if name != "theta"}
     if "slope" in want:
@@ -132,49 +128,40 @@ def _quantities(system: SkewGradient, frame: Frame, want: tuple[str, ...]) -> di
     return found
 
 
-class _Watch:
-    """Stops a run that has gone wrong, and says where and why."""
+class Progress:
+    """A progress bar that is made only when a run has lasted a second: making one costs as much as a short run."""
 
-    def __init__(self, problem: Problem, integrator: Integrator, h: float) -> None:
-        self.system, self.integrator, self.h = problem.system, integrator, h
-        # V >= 0 and H is constant, so the kinetic energy cannot exceed H; far below one unit of twist is rounding
-        chain = problem.chain
-        rounding = 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
-        self.bound = 10 * problem.energy() + rounding
+    def __init__(self, name: str, total: int, shown: bool) -> None:
+        self._name, self._total, self._shown = name, int(total), shown
+        self._done, self._started, self._bar = 0, clock.perf_counter(), None
 
-    def check(self, kinetic: float, previous: Any, memory: Any, step: int, time: float) -> None:
-        """Raise SimulationError if the way from `previous` to `memory` (positions hi + lo) cannot be trusted."""
-        lost = self.system.lost_heading(previous, memory)
-        if lost is not None:
-            raise SimulationError(
-                "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
-                "end the run earlier, or take a smaller dt if the motion is not resolved",
-                step,
-                time,
-                lost,
-            )
-        if kinetic <= self.bound:
-            return
-        speed = np.abs(memory.hi[2] - previous.hi[2])
-        disc = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
-        if np.isfinite(self.integrator.stability_limit):
-            name = self.integrator.name
-            cause = f"dt = {self.h:g} is above the stability limit of {name!r}: take a smaller dt or 'midpoint'"
-        else:
-            cause = "the step has lost all digits: take a smaller dt, fewer discs or softer springs"
-        what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
-        raise SimulationError(f"the run blew up, {what}; likely {cause}", step, time, disc)
+    def __enter__(self) -> "Progress":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def update(self, steps: int) -> None:
+        self._done += steps
+        if self._bar is not None:
+            self._bar.update(steps)
+        elif self._shown and clock.perf_counter() - self._started > 1:
+            self._bar = tqdm(total=self._total, initial=self._done, desc=self._name, unit="step")
 
 
 def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float:
     """A step for a method: accurate to about 1e-3 for smooth motion if implicit, 0.7 of the stability limit if explicit.
 
     Implicit: half the time a torsion wave takes from disc to disc, at most a hundredth of the duration.
+    SciPy's methods: a tenth of the duration, the longest step they may take.
     Explicit: the limit is the method's over Omega, Omega^2 the largest eigenvalue of C^T S C at the start; 0.7 leaves room for
     headings that grow.
     """
     integrator = find(method)
     chain = problem.chain
+    if integrator.adaptive:
+        return problem.duration / 10
     if not np.isfinite(integrator.stability_limit):
         stiffest = np.max(chain.torsion_stiffness)
         least = np.min(np.asarray(chain.spin_inertia) + np.asarray(chain.density) * np.asarray(chain.radius) ** 2)

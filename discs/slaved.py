@@ -33,7 +33,8 @@ class SlavedSystem(SkewGradient):
 
     def __init__(self, chain: Chain) -> None:
         n, ends = chain.n, chain.ends
-        self.n, self._ends = n, ends
+        self.n, self._ends, self._chain = n, ends, chain
+        self.closed, self.reach = ends == "ring", 3 if ends == "consistent" else 2
         self.scale = np.array([chain.length, chain.length, 1.0])
         self._springs: Any = LinearCurvature(chain) if chain.curvature == "linear" else TrueCurvature(chain)
         self.quadratic = self._springs.quadratic
@@ -80,7 +81,7 @@ class SlavedSystem(SkewGradient):
         return self.weights[2] + self.weights[0] * (e[0] ** 2 + e[1] ** 2)
 
     def frame(self, shape: NDArray) -> NDArray:
-        c = np.empty((3, self.n))
+        c = np.empty((3, self.n), shape.dtype)
         c[:2] = self.contact(shape)
         c[2] = 1 / np.sqrt(self.inertia(c[:2]))
         c[:2] *= c[2]
@@ -130,3 +131,11 @@ class SlavedSystem(SkewGradient):
 
     def stiffness(self, secant: Any, c: NDArray) -> NDArray:
         return self._springs.stiffness(secant, c)
+
+    @cached_property
+    def kernel(self) -> Any:
+        if not self.quadratic:
+            return None
+        from discs.kernels import slaved  # numba is slow to import
+
+        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs.hessians)

@@ -66,15 +66,18 @@ class LinearCurvature:
         return matrix
 
     @cached_property
+    def hessians(self) -> tuple[sp.csr_array, sp.csr_array]:
+        """grad^2 V by x or y, and by theta, (n, n)."""
+        link = stencils.link_matrix(self._n, self._ends)
+        tension = self._tension[: link.shape[0], : link.shape[0]]
+        return sp.csr_array(link.T @ tension @ link), sp.csr_array(link.T @ sp.diags_array(self._torsion) @ link)
+
+    @cached_property
     def _bands(self) -> NDArray:
-        """The Hessian S of V, (width + 1, 3, n) in the system's order: [j, :, i] couples discs i - j and i."""
-        n = self._n
-        link = stencils.link_matrix(n, self._ends)
-        bending = link.T @ self._tension[: link.shape[0], : link.shape[0]] @ link
-        torsion = link.T @ sp.diags_array(self._torsion) @ link
-        hessians = [sp.csr_array(bending), sp.csr_array(torsion)]
+        """grad^2 V, (width + 1, 3, n) in the system's order: [j, :, i] couples discs i - j and i."""
+        n, hessians = self._n, self.hessians
         if self._order is not None:
-            hessians = [a[self._order][:, self._order] for a in hessians]
+            hessians = hessians[0][self._order][:, self._order], hessians[1][self._order][:, self._order]
         # nonzero() leaves out springs of no stiffness, and the bands they would fill
         width = max(int(abs(row - col).max(initial=0)) for row, col in (a.nonzero() for a in hessians))
         bands = np.zeros((width + 1, 3, n))

@@ -23,7 +23,7 @@ Free ends of the limit, the planar Simo-Reissner rod rho r.. = n' + lambda, J ph
 """
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,9 +60,11 @@ class SteeredSystem(SkewGradient):
 
     rows = ("x", "y", "theta", "phi")
     quadratic = False
+    reach = 1
 
     def __init__(self, chain: SteeredChain) -> None:
-        self.n, self._k, self._ends = chain.n, chain.k, chain.ends
+        self.n, self._k, self._ends, self._chain = chain.n, chain.k, chain.ends, chain
+        self.closed = chain.ends == "ring"
         self.scale = np.array([chain.length, chain.length, 1.0, 1.0])
         self._shift = np.array([*chain.shift, 0.0, 2 * np.pi * chain.turns])
         self._radius = np.asarray(chain.radius)
@@ -193,3 +195,9 @@ class SteeredSystem(SkewGradient):
             b[:, 2, roll] = sign / self._k * c[2, disc]
             b[:, 3, roll + 1] = sign / self._k * c[3, disc]
         return self._assembly((b, self._stiffness.T))
+
+    @cached_property
+    def kernel(self) -> Any:
+        from discs.kernels import steered  # numba is slow to import
+
+        return steered.parameters(self._chain, self.weights, self._roots, self.scale, self._shift, self._stiffness)

@@ -43,7 +43,7 @@ def pull(tension: NDArray, ends: str) -> NDArray:
     """The transpose of `links`, (..., n_links) -> (..., n): minus the force that link tensions exert on the discs."""
     if ends == "ring":
         return np.roll(tension, 1, axis=-1) - tension
-    force = np.empty((*tension.shape[:-1], tension.shape[-1] + 1))
+    force = np.empty((*tension.shape[:-1], tension.shape[-1] + 1), tension.dtype)
     force[..., 0] = -tension[..., 0]
     force[..., -1] = tension[..., -1]
     np.subtract(tension[..., :-1], tension[..., 1:], out=force[..., 1:-1])

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpbsv
+from scipy.linalg.lapack import dpbsv, zgbsv
 
 
 class Phase(NamedTuple):
@@ -51,6 +51,8 @@ class SkewGradient(ABC):
     rows : names of the coordinates of a disc, "x", "y", "theta" and, with own headings, "phi".
     weights : (rows, n), inertia of each disc against each coordinate's rate.
     quadratic : whether V is quadratic, so that secants do not depend on the step.
+    closed : whether the chain is a ring.
+    reach : how many discs to either side a disc's rates depend on.
     """
 
     n: int
@@ -58,6 +60,8 @@ class SkewGradient(ABC):
     rows: tuple[str, ...]
     weights: NDArray
     quadratic: bool
+    closed: bool
+    reach: int
 
     # Kinematics
 
@@ -147,6 +151,11 @@ class SkewGradient(ABC):
     def _no_step(self) -> NDArray:
         return np.zeros((len(self.rows), self.n))
 
+    @property
+    @abstractmethod
+    def kernel(self) -> Any:
+        """The chain's parameters for the compiled methods of `discs.kernels`; None if it has no compiled form."""
+
     # The linear system of an implicit step
 
     @property
@@ -158,13 +167,25 @@ class SkewGradient(ABC):
     def _inverse_order(self) -> NDArray | None:
         return None if self.order is None else np.argsort(self.order)
 
-    def solve(self, secant: Any, c: NDArray, h: float, rhs: NDArray) -> NDArray:
-        """Solve (I + h**2/4 C^T B^T (stiffness) B C) p = rhs for p, of the shape of pi; banded Cholesky, O(n)."""
-        matrix = self.stiffness(secant, c)
-        matrix *= 0.25 * h * h
+    def solve(self, secant: Any, c: NDArray, g: complex, rhs: NDArray) -> NDArray:
+        """Solve (I + g C^T B^T (stiffness) B C) p = rhs for p, of the shape of pi; O(n).
+
+        For g > 0 by banded Cholesky, for a complex g by banded elimination. In double precision whatever that of `rhs`, which
+        is enough for a
+        correction: a state in `longdouble` is carried on in extended precision.
+        """
+        matrix = g * self.stiffness(secant, c)
         matrix[-1] += 1
+        rhs = rhs.astype(matrix.dtype)
         flat = rhs.ravel() if self.order is None else rhs.ravel()[self.order]
-        _, p, info = dpbsv(matrix, flat, overwrite_ab=True)
+        if np.iscomplexobj(matrix):
+            width, n = len(matrix) - 1, matrix.shape[1]
+            full = np.zeros((3 * width + 1, n), complex, order="F")  # `width` more rows above for the exchange of pivots
+            for j in range(width + 1):
+                full[2 * width - j, j:] = full[2 * width + j, : n - j] = matrix[width - j, j:]
+            _, _, p, info = zgbsv(width, width, full, flat, overwrite_ab=True)
+        else:
+            _, p, info = dpbsv(matrix, flat, overwrite_ab=True)
         if info:
             p = np.full(flat.size, np.nan)  # not positive definite: C is not finite, or all digits are lost
         if self._inverse_order is not None:

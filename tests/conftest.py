@@ -26,6 +26,13 @@ def models(kinds: list[Model]):
     return pytest.mark.parametrize("model", kinds, ids=lambda m: f"{m.law}-{m.ends}")
 
 
+def models_and_engines(kinds: list[Model], plain: list[Model] | None = None):
+    """Each model with the compiled twin where there is one, and with the plain one, which may be tried on fewer."""
+    pairs = [(m, "compiled") for m in kinds if m.law != "true"]
+    pairs += [(m, "plain") for m in kinds if plain is None or m in plain or m.law == "true"]
+    return pytest.mark.parametrize(("model", "engine"), pairs, ids=[f"{m.law}-{m.ends}-{engine}" for m, engine in pairs])
+
+
 def uneven(n: int, model: Model, seed: int = 1, *, equal: bool = False) -> Problem:
     """A bent, twisted, rolling chain; every disc and spring different unless `equal`."""
     rng = np.random.default_rng(seed)

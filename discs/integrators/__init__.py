@@ -2,12 +2,17 @@
 
 from discs import checks
 from discs.integrators.base import Integrator, OneStep, Work
-from discs.integrators.composition import Suzuki4
+from discs.integrators.composition import KahanLi6, Suzuki4
+from discs.integrators.gauss import Gauss4, Gauss6, Gauss8
+from discs.integrators.ivp import BDF, DOP853, LSODA, RK45, Radau
 from discs.integrators.leapfrog import Leapfrog
 from discs.integrators.midpoint import Midpoint
+from discs.integrators.perlmutter import McLachlanPerlmutter
 from discs.integrators.rk4 import RK4
 
-METHODS: dict[str, type[Integrator]] = {cls.name: cls for cls in (Midpoint, Suzuki4, RK4, Leapfrog)}
+_OWN: tuple[type[Integrator], ...] = (Midpoint, Suzuki4, KahanLi6, Gauss4, Gauss6, Gauss8, Leapfrog, McLachlanPerlmutter, RK4)
+_SCIPY: tuple[type[Integrator], ...] = (RK45, DOP853, Radau, BDF, LSODA)
+METHODS: dict[str, type[Integrator]] = {cls.name: cls for cls in (*_OWN, *_SCIPY)}
 
 
 def find(method: str | Integrator) -> Integrator:
@@ -17,4 +22,24 @@ def find(method: str | Integrator) -> Integrator:
     return METHODS[checks.choice("method", method, METHODS)]()
 
 
-__all__ = ["METHODS", "RK4", "Integrator", "Leapfrog", "Midpoint", "OneStep", "Suzuki4", "Work", "find"]
+__all__ = [
+    "BDF",
+    "DOP853",
+    "LSODA",
+    "METHODS",
+    "RK4",
+    "RK45",
+    "Gauss4",
+    "Gauss6",
+    "Gauss8",
+    "Integrator",
+    "KahanLi6",
+    "Leapfrog",
+    "McLachlanPerlmutter",
+    "Midpoint",
+    "OneStep",
+    "Radau",
+    "Suzuki4",
+    "Work",
+    "find",
+]

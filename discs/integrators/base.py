@@ -25,6 +25,22 @@ class Work:
     solves: int = 0
     unconverged: int = 0
 
+    def add(self, tally: "Tally") -> None:
+        """Count what a compiled run has cost."""
+        self.gradients += tally.gradients
+        self.solves += tally.solves
+        self.unconverged += tally.unconverged
+
+
+class Tally(NamedTuple):
+    """What a compiled run of steps reports: steps taken, its work, and a disc that lost its heading or -1."""
+
+    steps: int
+    gradients: int
+    solves: int
+    unconverged: int
+    lost: int
+
 
 class Frame(NamedTuple):
     """Positions q = hi + lo and their rates of change, all (rows, n)."""
@@ -45,6 +61,7 @@ class Integrator(ABC):
     reference : where it comes from.
     stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
     offers : names of extra quantities it can report per frame, see `extras`.
+    adaptive : whether it chooses its own steps; then h is the longest it may take.
     """
 
     name: ClassVar[str]
@@ -52,55 +69,80 @@ class Integrator(ABC):
     preserves: ClassVar[str]
     reference: ClassVar[str]
     stability_limit: ClassVar[float]
-    offers: ClassVar[tuple[str, ...]]
+    offers: ClassVar[tuple[str, ...]] = ()
+    adaptive: ClassVar[bool] = False
 
     @abstractmethod
-    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Any:
-        """What the method must remember between steps of size h, at the first time."""
+    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> Any:
+        """What the method must remember between steps of size h, at the first time.
+
+        `chain`, here and below, are the parameters for the compiled form, `system.kernel`; None for the plain one.
+        """
 
     @abstractmethod
     def advance(self, system: SkewGradient, memory: Any, h: float, work: Work) -> Any:
         """The memory one step h later."""
 
     @abstractmethod
-    def at(self, system: SkewGradient, memory: Any, tau: float, h: float, work: Work) -> Frame:
+    def march(self, chain: Any, memory: Any, h: float, steps: int, bound: float) -> tuple[Any, Tally]:
+        """The compiled twin of `steps` times `advance`, for the parameters `system.kernel` of a chain.
+
+        Stops after a step whose kinetic energy is not below `bound`, or in which a disc loses its heading.
+        """
+
+    @abstractmethod
+    def at(self, system: SkewGradient, memory: Any, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         """The discs a time 0 <= tau < h after the last step (of size h); the trajectory is not touched."""
 
     @abstractmethod
     def kinetic(self, system: SkewGradient, memory: Any, h: float) -> float:
         """Kinetic energy at the last step; for a two-step method, half a step later."""
 
-    @abstractmethod
     def extras(self, system: SkewGradient, memory: Any, h: float) -> dict[str, float]:
         """The quantities in `offers`, at the last step."""
+        return {}
 
 
 class OneStep(Integrator):
     """A method whose step needs the state alone: the memory is the state, and frames are reached by a shorter step."""
 
-    offers: ClassVar[tuple[str, ...]] = ()
-
     @abstractmethod
     def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         """One step from z, a pure function of its arguments (work is counted up)."""
 
+    @abstractmethod
+    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
+        """The compiled twin of `steps` times `step`, in place; pi is (1, n), or (2, n) with own headings. Returns a tally's
+        entries."""
+
     @final
-    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> Phase:
         return z
+
+    @final
+    def march(self, chain: Any, memory: Phase, h: float, steps: int, bound: float) -> tuple[Phase, Tally]:
+        z = Phase(memory.hi.copy(), memory.lo.copy(), memory.pi.copy())
+        return z, Tally(*self.kernel(chain, z.hi, z.lo, np.atleast_2d(z.pi), h, steps, bound))
 
     @final
     def advance(self, system: SkewGradient, memory: Phase, h: float, work: Work) -> Phase:
         return self.step(system, memory, h, work)
 
     @final
-    def at(self, system: SkewGradient, memory: Phase, tau: float, h: float, work: Work) -> Frame:
-        z = self.step(system, memory, tau, work) if tau else memory
-        return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
+    def at(self, system: SkewGradient, memory: Phase, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+        if chain is None:
+            z = self.step(system, memory, tau, work) if tau else memory
+            return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
+        from discs.kernels import methods
+
+        z = memory
+        if tau:
+            z, tally = self.march(chain, memory, tau, 1, np.inf)
+            work.add(tally)
+        rate = np.empty_like(z.hi)
+        methods.rates(chain, z.hi, z.lo, np.atleast_2d(z.pi), rate)
+        return Frame(z.hi, z.lo, rate)
 
     @final
     def kinetic(self, system: SkewGradient, memory: Phase, h: float) -> float:
         return 0.5 * float(np.vdot(memory.pi, memory.pi))
-
-    @final
-    def extras(self, system: SkewGradient, memory: Phase, h: float) -> dict[str, float]:
-        return {}

@@ -1,35 +1,36 @@
 """Symmetric compositions of midpoint steps: higher order, the same exact energy."""
 
+from abc import ABC
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discs.integrators.base import OneStep, Work
 from discs.integrators.midpoint import Midpoint
 from discs.system import Phase, SkewGradient
 
-SUZUKI = 1 / (4 - 4 ** (1 / 3))
-
 
 @dataclass(frozen=True)
-class Suzuki4(OneStep):
-    """Five midpoint steps of s h, s h, (1 - 4s) h, s h, s h with s = 1/(4 - 4^{1/3}); the fractions sum to 1 and their
-    cubes to 0. On stiff modes, h much larger than their period, the order is lower.
+class Composition(OneStep, ABC):
+    """Midpoint steps of fractions of h, the same forwards and backwards. On stiff modes, h much larger than their period,
+    the order is lower.
 
     Parameters
     ----------
     base : the midpoint method that is composed.
+
+    Attributes
+    ----------
+    fractions : they sum to 1; their cubes, and for order 6 their fifth powers and one more condition, vanish.
     """
 
     base: Midpoint = field(default_factory=Midpoint)
 
-    name: ClassVar[str] = "suzuki4"
-    order: ClassVar[int] = 4
+    fractions: ClassVar[tuple[float, ...]]
     preserves: ClassVar[str] = Midpoint.preserves
-    reference: ClassVar[str] = "Suzuki, Phys. Lett. A 146 (1990) 319"
     stability_limit: ClassVar[float] = np.inf
-    fractions: ClassVar[tuple[float, ...]] = (SUZUKI, SUZUKI, 1 - 4 * SUZUKI, SUZUKI, SUZUKI)
 
     def __post_init__(self) -> None:
         if not isinstance(self.base, Midpoint):
@@ -39,3 +40,35 @@ class Suzuki4(OneStep):
         for fraction in self.fractions:
             z = self.base.step(system, z, fraction * h, work)
         return z
+
+    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
+        from discs.kernels import methods
+
+        fractions = np.array(self.fractions)
+        return methods.compose(chain, hi, lo, pi, fractions, h, steps, self.base.sweeps, self.base.tolerance, bound)
+
+
+SUZUKI = 1 / (4 - 4 ** (1 / 3))
+
+
+class Suzuki4(Composition):
+    """Five midpoint steps of s h, s h, (1 - 4s) h, s h, s h with s = 1/(4 - 4^{1/3})."""
+
+    name: ClassVar[str] = "suzuki4"
+    order: ClassVar[int] = 4
+    reference: ClassVar[str] = "Suzuki, Phys. Lett. A 146 (1990) 319"
+    fractions: ClassVar[tuple[float, ...]] = (SUZUKI, SUZUKI, 1 - 4 * SUZUKI, SUZUKI, SUZUKI)
+
+
+KAHAN_LI = (0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.082213596293550800230)
+
+
+class KahanLi6(Composition):
+    """Nine midpoint steps, the longest fraction 0.80: of the nine-stage compositions of order 6 the one of least error
+    coefficient that
+    Kahan and Li found."""
+
+    name: ClassVar[str] = "kahanli6"
+    order: ClassVar[int] = 6
+    reference: ClassVar[str] = "Kahan, Li, Math. Comp. 66 (1997) 1089; Hairer, Lubich, Wanner, V.3.2"
+    fractions: ClassVar[tuple[float, ...]] = (*KAHAN_LI, 1 - 2 * sum(KAHAN_LI), *KAHAN_LI[::-1])

@@ -1,11 +1,11 @@
 """The paper's explicit two-step scheme."""
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from numpy.typing import NDArray
 
-from discs.integrators.base import Frame, Integrator, Work
+from discs.integrators.base import Frame, Integrator, Tally, Work
 from discs.integrators.rk4 import RK4
 from discs.system import Phase, SkewGradient, add
 
@@ -44,7 +44,7 @@ class Leapfrog(Integrator):
     stability_limit: ClassVar[float] = 2.0
     offers: ClassVar[tuple[str, ...]] = ("modified_energy",)
 
-    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work) -> TwoStep:
+    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> TwoStep:
         first = RK4().step(system, z, h, work)
         move = (first.hi - z.hi) + (first.lo - z.lo)
         central = 2 * h * system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi)
@@ -58,12 +58,18 @@ class Leapfrog(Integrator):
         work.gradients += 1
         return TwoStep(hi, lo, memory.next, system.forward(c, system.back(c, free)) - memory.next)
 
-    def at(self, system: SkewGradient, memory: TwoStep, tau: float, h: float, work: Work) -> Frame:
+    def march(self, chain: Any, memory: TwoStep, h: float, steps: int, bound: float) -> tuple[TwoStep, Tally]:
+        from discs.kernels import methods
+
+        after = TwoStep(*(array.copy() for array in memory))
+        return after, Tally(*methods.leapfrog(chain, *after, h, steps, bound))
+
+    def at(self, system: SkewGradient, memory: TwoStep, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         rate = (memory.last + memory.next) / (2 * h)
         if not tau:
             return Frame(memory.hi, memory.lo, rate)
         pi = system.back(system.frame(system.shape(memory.hi, memory.lo)), system.weights * rate)
-        return RK4().at(system, Phase(memory.hi, memory.lo, pi), tau, h, work)
+        return RK4().at(system, Phase(memory.hi, memory.lo, pi), tau, h, work, chain)
 
     def kinetic(self, system: SkewGradient, memory: TwoStep, h: float) -> float:
         return system.kinetic(memory.next / h)

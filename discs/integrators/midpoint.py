@@ -1,9 +1,10 @@
 """Implicit midpoint in (q, pi), solved by sweeps with frozen geometry."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
@@ -46,9 +47,7 @@ class Midpoint(OneStep):
     stability_limit: ClassVar[float] = np.inf
 
     def __post_init__(self) -> None:
-        checks.whole("sweeps", self.sweeps, 1)
-        if checks.number("tolerance", self.tolerance) < 0:
-            raise ValueError(f"tolerance must be at least 0; got {self.tolerance!r}")
+        checks.iteration(self.sweeps, self.tolerance)
 
     def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)
@@ -56,7 +55,7 @@ class Midpoint(OneStep):
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
             c = system.frame(system.moved(shape, move))
             secant = system.secant(shape, h * system.forward(c, p))
-            change = system.solve(secant, c, h, z.pi - p - 0.5 * h * system.back(c, system.mean_force(secant)))
+            change = system.solve(secant, c, 0.25 * h * h, z.pi - p - 0.5 * h * system.back(c, system.mean_force(secant)))
             p = p + change
             last, move = move, 0.5 * h * system.forward(c, p)
             if (np.abs(move - last).max(axis=1) <= self.tolerance * system.scale).all():
@@ -65,3 +64,8 @@ class Midpoint(OneStep):
         work.solves += sweep
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
         return Phase(*add(z.hi, z.lo, 2 * move), 2 * p - z.pi)
+
+    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
+        from discs.kernels import methods
+
+        return methods.compose(chain, hi, lo, pi, np.ones(1), h, steps, self.sweeps, self.tolerance, bound)

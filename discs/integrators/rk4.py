@@ -1,7 +1,7 @@
 """The classical explicit Runge-Kutta method on the reduced equations."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +36,8 @@ class RK4(OneStep):
         q4, p4 = rate(h * q3, h * p3)
         dq, dpi = (h / 6 * (a + 2 * b + 2 * c + d) for a, b, c, d in ((q1, q2, q3, q4), (p1, p2, p3, p4)))
         return Phase(*add(z.hi, z.lo, dq), z.pi + dpi)
+
+    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
+        from discs.kernels import methods
+
+        return methods.rk4(chain, hi, lo, pi, h, steps, bound)

@@ -1,0 +1,277 @@
+"""Speed against error: our methods and what a user would take instead, one problem, one machine, one run."""
+
+import csv
+import time as clock
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from compare import figures
+from compare.lump import lump
+from compare.peers import reduced
+from compare.peers.reduced import Cutoff, Outcome, Peer
+from continuum import Scene
+from discs import Gauss6, Gauss8, Integrator, Midpoint, Problem, SimulationError, Suzuki4, checks, simulate
+
+SIZES = (32, 128, 512, 2048)
+WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
+ERRORS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+
+
+class Row(NamedTuple):
+    """One method with one setting on one problem.
+
+    error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none. seconds
+    : median.
+    steps, gradients, solves : what it took, None where a peer does not tell. remark : why there is no result, or what is wrong
+    with it.
+    """
+
+    problem: str
+    n: int
+    method: str
+    ours: bool
+    setting: float
+    error: float
+    seconds: float
+    steps: int | None
+    gradients: int | None
+    solves: int | None
+    remark: str
+
+
+@dataclass(frozen=True, eq=False)
+class WorkPrecision:
+    """Speed against error.
+
+    Attributes
+    ----------
+    rows : one for each method, setting and problem, failures included.
+    references : (problem, n) -> estimated error of the reference.
+    differences : method -> how it differs from the problem the others solve.
+    """
+
+    rows: list[Row]
+    references: dict[tuple[str, int], float]
+    differences: dict[str, str]
+
+    @property
+    def problems(self) -> list[tuple[str, int]]:
+        """The problems, by name and number of discs."""
+        return list(dict.fromkeys((row.problem, row.n) for row in self.rows))
+
+    def curve(self, problem: str, n: int, method: str) -> tuple[NDArray, NDArray]:
+        """Errors and seconds of a method, from loose to tight, without what is slower and less accurate than another of its
+        runs."""
+        found = [(r.error, r.seconds) for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method) and r.error < 1]
+        best = [(e, s) for e, s in found if not any(f <= e and t <= s and (f, t) != (e, s) for f, t in found)]
+        errors, seconds = np.array(sorted(best, reverse=True)).reshape(-1, 2).T
+        return errors, seconds
+
+    def time_at(self, error: float, problem: str, n: int, ours: bool) -> tuple[float, str]:
+        """The least time that any method takes to an error (interpolated between its runs, log-log), and its name; infinite if
+        none does."""
+        best = np.inf, ""
+        for method in dict.fromkeys(r.method for r in self.rows if r.ours == ours):
+            errors, seconds = self.curve(problem, n, method)
+            if errors.size and errors[-1] <= error:
+                at = float(np.exp(np.interp(-np.log(error), -np.log(errors), np.log(seconds))))
+                best = min(best, (at, method))
+        return best
+
+    def speedups(self, errors: Iterable[float] = ERRORS) -> str:
+        """How many times faster ours are than the fastest peer at equal error, as a table."""
+        lines = ["| problem | N | error | ours | | fastest peer | | times |", "| --- " * 8 + "|"]
+        for problem, n in self.problems:
+            for error in errors:
+                (ours, mine), (peers, other) = self.time_at(error, problem, n, True), self.time_at(error, problem, n, False)
+                if not np.isfinite(ours):
+                    continue
+                ratio = f"{peers / ours:.0f}" if np.isfinite(peers) else "no peer"
+                there = f"{1e3 * peers:.3g} ms" if np.isfinite(peers) else "–"
+                lines.append(
+                    f"| {problem} | {n} | {error:.0e} | {mine} | {1e3 * ours:.3g} ms | {other or '–'} | {there} | {ratio} |"
+                )
+        return "\n".join(lines)
+
+    def table(self) -> str:
+        """All runs, as a table."""
+        lines = ["| problem | N | method | setting | error | ms | steps | gradients | solves | remark |", "| --- " * 10 + "|"]
+        for r in self.rows:
+            counts = " | ".join("–" if c is None else str(c) for c in (r.steps, r.gradients, r.solves))
+            error = f"{r.error:.1e}" if np.isfinite(r.error) else "–"
+            lines.append(
+                f"| {r.problem} | {r.n} | {r.method} | {r.setting:.3g} | {error} | {1e3 * r.seconds:.3g} | {counts} | {r.remark} |"
+            )
+        return "\n".join(lines)
+
+    def report(self) -> str:
+        """Speedups, what differs, and all runs, in Markdown."""
+        floor = max(self.references.values(), default=0.0)
+        return "\n\n".join(
+            [
+                "# Speed against error",
+                f"Ours against the fastest peer at equal error. Reference: gauss8 with short steps, off by at most {floor:.1e}.",
+                self.speedups(),
+                *(f"* {name}: {how}." for name, how in self.differences.items()),
+                "All runs; errors relative to the largest value of each of x, y, θ (φ), times are medians.",
+                self.table(),
+            ]
+        )
+
+    def save(self, path: str | Path) -> None:
+        """All runs, as CSV."""
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(Row._fields)
+            writer.writerows(self.rows)
+
+    def plot(self, path: str | Path | None = None) -> Sequence[Axes]:
+        """Error against time, a panel for each problem; saved if a path is given."""
+        axes = figures.precision(self)
+        if path is not None:
+            figures.save(axes[0], path)
+        return axes
+
+
+def ours(problem: Problem) -> list[Peer]:
+    """Our methods; sweeps converge to a part of the error that a step of this length makes."""
+    t = problem.duration
+
+    def fixed(name: str, steps: Sequence[int], method: Callable[[int], Integrator]) -> Peer:
+        def run(setting: float, seconds: float) -> Outcome:
+            return _outcome(problem, lambda: simulate(problem, method(int(setting)), t / setting, frames=1, progress=False))
+
+        return Peer(name, tuple(map(float, steps)), run)
+
+    def to_tolerance(setting: float, seconds: float) -> Outcome:
+        return _outcome(problem, lambda: simulate(problem, "auto", tol=setting, frames=1, progress=False))
+
+    many = [round(12 * 2 ** (j / 2)) for j in range(15)]
+    return [
+        fixed("midpoint", many, lambda m: Midpoint(tolerance=0.03 / m**2)),
+        fixed("suzuki4", many[:11], lambda m: Suzuki4(Midpoint(tolerance=max(0.01 / m**3, 1e-13)))),
+        fixed("gauss6", many[:13], lambda m: Gauss6(tolerance=max(1e-4 / m**3, 1e-13))),
+        fixed("gauss8", many[:11], lambda m: Gauss8(tolerance=max(1e-5 / m**3, 1e-13))),
+        Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all its attempts are counted; the setting is tol"),
+    ]
+
+
+def _outcome(problem: Problem, run: Callable) -> Outcome:
+    begun = clock.perf_counter()
+    found = run()
+    spent = clock.perf_counter() - begun
+    if found.stats["unconverged"]:
+        raise ArithmeticError(f"{found.stats['unconverged']} steps did not converge")
+    q = np.array([getattr(found, row)[-1] for row in problem.system.rows])
+    return Outcome(q, found.stats["steps"], found.stats["gradients"], found.stats["solves"], spent)
+
+
+def peers(problem: Problem) -> list[Peer]:
+    """The peers that are installed."""
+    f = reduced.Bound(problem)
+    found = reduced.scipy_peers(problem, f)
+    if find_spec("sksundae"):
+        found += [*reduced.sundials_peers(problem, f), reduced.multiplier_peer(problem)]
+    if find_spec("diffrax") and problem.chain.ends == "springs":
+        found += reduced.diffrax_peers(problem)
+    if problem.chain.n <= 128:
+        found.append(reduced.saddle_peer(problem))
+    return found
+
+
+def reference(problem: Problem) -> tuple[NDArray, float]:
+    """Positions at the end by "gauss8" with short steps, (rows, n), and what halving them changes."""
+    found = []
+    for steps in (1000, 2000):
+        run = simulate(problem, Gauss8(tolerance=1e-14, sweeps=20), problem.duration / steps, frames=1, progress=False)
+        found.append(np.array([getattr(run, row)[-1] for row in problem.system.rows]))
+    return found[1], _distance(found[0], found[1])
+
+
+def _distance(q: NDArray, exact: NDArray) -> float:
+    """Largest difference, each row relative to its largest value."""
+    return float((np.abs(q - exact).max(axis=1) / np.abs(exact).max(axis=1)).max())
+
+
+def work_precision(
+    scenes: Scene | dict[str, Scene],
+    n: Sequence[int] = SIZES,
+    methods: Callable[[Problem], list[Peer]] | None = None,
+    repeats: int = 5,
+    seconds: float = 10.0,
+    progress: bool = True,
+) -> WorkPrecision:
+    """Measure speed against error at the end of scenes.
+
+    Every method runs from loose to tight settings: once to warm up, then `repeats` times, of which the median counts. A
+    setting that takes
+    longer than `seconds` is run only once, and the method's tighter ones are left out; all is in the table with the reason.
+
+    Parameters
+    ----------
+    scenes : a scene, or several by name.
+    n : numbers of discs, with plain springs at free ends.
+    methods : problem -> methods to run; None takes ours and the peers that are installed.
+    repeats : how often each run is timed.
+    seconds : the longest time for one run.
+    progress : show a progress bar.
+
+    Raises
+    ------
+    ValueError : for sizes, repeats or times that are not positive.
+    """
+    checks.whole("repeats", repeats, 1)
+    checks.number("seconds", seconds, positive=True)
+    named = scenes if isinstance(scenes, dict) else {scenes.name: scenes}
+    rows: list[Row] = []
+    references, differences = {}, {}
+    for name, scene in named.items():
+        for size in n:
+            problem = lump(scene, size)
+            exact, floor = reference(problem)
+            references[name, size] = floor
+            mine = ours(problem)
+            others = peers(problem) if methods is None else methods(problem)
+            for peer in tqdm([*mine, *others], desc=f"{name}, N = {size}", disable=not progress, leave=False):
+                if peer.tells:
+                    differences[peer.name] = peer.tells
+                rows += _measure(peer, name, size, exact, peer in mine, repeats, seconds)
+    return WorkPrecision(rows, references, differences)
+
+
+def _measure(peer: Peer, name: str, n: int, exact: NDArray, ours: bool, repeats: int, limit: float) -> list[Row]:
+    """The rows of one method, from loose to tight."""
+    rows = []
+    for setting in peer.settings:
+        begun = clock.perf_counter()
+        row = Row(name, n, peer.name, ours, setting, np.nan, np.nan, None, None, None, "")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = peer.run(setting, limit)
+                times = [found.seconds]
+                if found.seconds < limit / repeats:
+                    times = [peer.run(setting, limit).seconds for _ in range(repeats)]
+        except Cutoff:
+            rows.append(row._replace(seconds=clock.perf_counter() - begun, remark=f"cut off after {limit:g} s; tighter left out"))
+            break
+        except (ArithmeticError, SimulationError, RuntimeError, ValueError) as error:
+            rows.append(row._replace(seconds=clock.perf_counter() - begun, remark=f"failed: {error}".replace("\n", " ")[:100]))
+            continue
+        off = _distance(found.q, exact)
+        tolerance = setting if setting < 1 else np.nan
+        remark = "says it succeeded, and is wrong" if off > max(WRONG * tolerance, 0.01) else ""
+        row = row._replace(error=off, seconds=float(np.median(times)), steps=found.steps or None, gradients=found.gradients)
+        rows.append(row._replace(solves=found.solves, remark=remark))
+        if found.seconds > limit:
+            break
+    return rows

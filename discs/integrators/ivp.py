@@ -1,0 +1,175 @@
+"""SciPy's integrators on the reduced equations, to compare with and for tolerances by step control."""
+
+from abc import ABC
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.integrate
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from discs import checks
+from discs.integrators.base import Frame, Integrator, Tally, Work
+from discs.system import Phase, SkewGradient
+
+
+class Reduced:
+    """The reduced equations q. = C pi, pi. = -C^T grad V as y. = f(t, y), disc by disc: y = (x, y, theta, pi, ...) of disc 0,
+    then 1 …
+
+    Parameters
+    ----------
+    system : the chain.
+    chain : `system.kernel` for the compiled form, None for the plain one.
+    """
+
+    def __init__(self, system: SkewGradient, chain: Any = None) -> None:
+        self.system, self.chain, self.rows, self.n = system, chain, len(system.rows), system.n
+
+    def join(self, q: NDArray, pi: NDArray) -> NDArray:
+        """y of positions (rows, n) and momenta."""
+        return np.concatenate([q, np.atleast_2d(pi)]).T.ravel()
+
+    def split(self, y: NDArray) -> Phase:
+        """Positions and momenta of y."""
+        state = y.reshape(self.n, -1).T
+        q, pi = np.ascontiguousarray(state[: self.rows]), np.ascontiguousarray(state[self.rows :])
+        return Phase(q, np.zeros_like(q), pi if len(pi) > 1 else pi[0])
+
+    def __call__(self, t: float, y: NDArray) -> NDArray:
+        """The rate of y."""
+        if self.chain is not None:
+            from discs.kernels import methods
+
+            out = np.empty_like(y)
+            methods.reduced(self.chain, np.ascontiguousarray(y), out)
+            return out
+        z = self.split(y)
+        shape = self.system.shape(z.hi)
+        c = self.system.frame(shape)
+        return self.join(self.system.forward(c, z.pi), -self.system.back(c, self.system.gradient(shape)))
+
+    @property
+    def width(self) -> int:
+        """Half the bandwidth of the Jacobian of f, of an open chain."""
+        return (self.system.reach + 1) * (2 * self.rows - 2) - 1
+
+    def sparsity(self) -> sp.csc_array:
+        """Where the Jacobian of f may differ from zero."""
+        n, reach = self.n, self.system.reach
+        offsets = [j for j in range(-reach, reach + 1) if abs(j) < n]
+        if self.system.closed:
+            offsets += [j + side * n for j in range(-reach, reach + 1) for side in (-1, 1) if 0 < abs(j + side * n) < n]
+        near = sp.diags_array(np.ones((len(set(offsets)), 1)), offsets=sorted(set(offsets)), shape=(n, n))
+        return sp.csc_array(sp.kron(near, np.ones((2 * self.rows - 2, 2 * self.rows - 2))))
+
+
+@dataclass(frozen=True)
+class SolveIvp(Integrator, ABC):
+    """A method of `scipy.integrate.solve_ivp` on y = (q, pi): steps of its own choice, no longer than dt; frames are interpolated.
+
+    It keeps nothing but what its tolerances keep (the rolling constraint holds identically in these variables).
+
+    Parameters
+    ----------
+    rtol, atol : tolerances of a step's error, relative to |y| and absolute; pi of a disc is small like the root of its share
+    of length.
+    """
+
+    rtol: float = 1e-6
+    atol: float = 1e-9
+
+    preserves: ClassVar[str] = "the rolling constraint"
+    reference: ClassVar[str] = "Virtanen et al., SciPy, Nature Methods 17 (2020) 261; scipy.integrate.solve_ivp"
+    stability_limit: ClassVar[float] = np.inf
+    adaptive: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        checks.number("rtol", self.rtol, positive=True)
+        checks.number("atol", self.atol, positive=True)
+
+    def options(self, f: Reduced) -> dict[str, Any]:
+        """What the method is told about the Jacobian."""
+        return {}
+
+    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> "Course":
+        f = Reduced(system, chain)
+        method = getattr(scipy.integrate, self.name)
+        y = f.join(z.hi + z.lo, z.pi)
+        solver = method(f, 0.0, y, np.inf, rtol=self.rtol, atol=self.atol, max_step=h, **self.options(f))
+        return Course(f, solver, 0.0, z)
+
+    def advance(self, system: SkewGradient, memory: "Course", h: float, work: Work) -> "Course":
+        return memory.to(memory.time + h, work)
+
+    def march(self, chain: Any, memory: "Course", h: float, steps: int, bound: float) -> tuple["Course", Tally]:
+        raise NotImplementedError("SciPy's methods are not compiled; their equations are")
+
+    def at(self, system: SkewGradient, memory: "Course", tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+        z = memory.to(memory.time + tau, work) if tau else memory
+        return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
+
+    def kinetic(self, system: SkewGradient, memory: "Course", h: float) -> float:
+        return 0.5 * float(np.vdot(memory.pi, memory.pi))
+
+
+class Course:
+    """A running SciPy solver, seen at a time: it steps ahead as far as it is asked to and is interpolated."""
+
+    def __init__(self, f: Reduced, solver: scipy.integrate.OdeSolver, time: float, z: Phase) -> None:
+        self.f, self.solver, self.time = f, solver, time
+        self.hi, self.lo, self.pi = z
+
+    def to(self, time: float, work: Work) -> "Course":
+        """The same solver at a later time."""
+        while self.solver.t < time:
+            message = self.solver.step()
+            if self.solver.status == "failed":
+                raise ArithmeticError(f"{type(self.solver).__name__} gave up at t = {self.solver.t:g}: {message}")
+        work.gradients, work.solves = self.solver.nfev, self.solver.nlu
+        return Course(self.f, self.solver, time, self.f.split(self.solver.dense_output()(time)))
+
+
+class RK45(SolveIvp):
+    """Dormand and Prince's pair of orders 5 and 4; explicit."""
+
+    name: ClassVar[str] = "RK45"
+    order: ClassVar[int] = 5
+
+
+class DOP853(SolveIvp):
+    """Dormand and Prince's method of order 8; explicit."""
+
+    name: ClassVar[str] = "DOP853"
+    order: ClassVar[int] = 8
+
+
+class Radau(SolveIvp):
+    """Radau IIA of order 5; implicit, damps what its steps do not resolve."""
+
+    name: ClassVar[str] = "Radau"
+    order: ClassVar[int] = 5
+
+    def options(self, f: Reduced) -> dict[str, Any]:
+        return {"jac_sparsity": f.sparsity()}
+
+
+class BDF(SolveIvp):
+    """Backward differences of orders 1 to 5; from order 3 on unstable for oscillations, so slow for many discs."""
+
+    name: ClassVar[str] = "BDF"
+    order: ClassVar[int] = 5
+
+    def options(self, f: Reduced) -> dict[str, Any]:
+        return {"jac_sparsity": f.sparsity()}
+
+
+class LSODA(SolveIvp):
+    """Adams' methods and backward differences by turns (ODEPACK)."""
+
+    name: ClassVar[str] = "LSODA"
+    order: ClassVar[int] = 5
+
+    def options(self, f: Reduced) -> dict[str, Any]:
+        return {} if f.system.closed else {"lband": f.width, "uband": f.width}

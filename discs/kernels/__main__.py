@@ -1,0 +1,33 @@
+"""`python -m discs.kernels`: compile all kernels now, once on a machine, so that no run has to wait for it."""
+
+import subprocess
+import sys
+from typing import Any
+
+from discs.chain import Chain, SteeredChain
+from discs.integrators import METHODS
+from discs.problem import Problem, State
+from discs.simulation import simulate
+
+ONES = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius")
+OWN = ("heading_inertia", "stretch_stiffness", "shear_stiffness")
+OF = {"midpoint": "compositions", "gauss6": "Gauss methods"}  # kernels that several methods share
+
+
+def compile_for(law: str) -> None:
+    """Compile every kernel for a kind of chain, "slaved" or "own" headings."""
+    own = law == "own"
+    values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + OWN if own else ONES, 1.0)
+    chain: Chain | SteeredChain = SteeredChain(**values) if own else Chain(**values)
+    problem = Problem(chain, State(chain.s, 0 * chain.s, chain.s, phi=0 * chain.s if own else None), 0.01)
+    for name in ("midpoint", "gauss6", "rk4", "leapfrog", "mclachlan-perlmutter", "RK45"):
+        simulate(problem, METHODS[name](), 0.005, frames=1, progress=False)
+        print(f"discs with {law} headings: {OF.get(name, name)} compiled", flush=True)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        compile_for(sys.argv[1])
+    else:  # side by side: a processor each
+        both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", law]) for law in ("slaved", "own")]
+        sys.exit(max(process.wait() for process in both))

@@ -1,0 +1,180 @@
+r"""Symmetric banded systems, eliminated from both ends at once: two independent recurrences, which a processor runs side by side.
+
+Pivots are not exchanged: the matrices are I + g A with A positive semidefinite, and g positive or complex with a positive real
+part or imaginary part, whose pivots stay away from zero.
+
+Pentadiagonal: a[i] on the diagonal, u[i] couples i and i + 1, w[i] couples i and i + 2; corner[0] couples 0 and 3 and corner[1]
+n - 4 and n - 1 (a ghost disc's bend). Factors overwrite them: reciprocal pivots and multipliers. The rows of the first half are
+eliminated downwards, those of the second half upwards, and two rows in the middle, p and p + 1, remain. Below eight rows one
+elimination downwards does.
+"""
+
+from numba.core import types
+from numba.extending import overload
+
+from discs.kernels.compiled import PART, part
+
+FEW = 8
+
+
+def reciprocal(z):
+    """1/z, for a complex z without the care for overflow that is not needed here."""
+    return 1 / z
+
+
+@overload(reciprocal, jit_options=PART)
+def _reciprocal(z):
+    if isinstance(z, types.Complex):
+        return lambda z: z.conjugate() * (1.0 / (z.real * z.real + z.imag * z.imag))
+    return lambda z: 1.0 / z
+
+
+@part
+def factor_few(a, u, w, corner):
+    """`factor` by one elimination downwards."""
+    n = a.size
+    for i in range(n):
+        third = corner[0] if i == 0 else (corner[1] if i == n - 4 else 0 * corner[1])
+        first, second = u[i], w[i]
+        a[i] = reciprocal(a[i])
+        if i + 1 < n:
+            u[i] = first * a[i]
+            a[i + 1] -= u[i] * first
+            if i + 2 < n:
+                w[i] = second * a[i]
+                u[i + 1] -= u[i] * second
+                a[i + 2] -= w[i] * second
+            if i + 3 < n and (i == 0 or i == n - 4):
+                corner[0 if i == 0 else 1] = third * a[i]
+                w[i + 1] -= u[i] * third
+                u[i + 2] -= w[i] * third
+                a[i + 3] -= third * a[i] * third
+
+
+@part
+def substitute_few(a, u, w, corner, b):
+    """`substitute` for the factors of `factor_few`."""
+    n = a.size
+    for i in range(n):
+        if i + 1 < n:
+            b[i + 1] -= u[i] * b[i]
+        if i + 2 < n:
+            b[i + 2] -= w[i] * b[i]
+        if i + 3 < n and (i == 0 or i == n - 4):
+            b[i + 3] -= corner[0 if i == 0 else 1] * b[i]
+    for i in range(n - 1, -1, -1):
+        b[i] *= a[i]
+        if i + 1 < n:
+            b[i] -= u[i] * b[i + 1]
+        if i + 2 < n:
+            b[i] -= w[i] * b[i + 2]
+        if i + 3 < n and (i == 0 or i == n - 4):
+            b[i] -= corner[0 if i == 0 else 1] * b[i + 3]
+
+
+@part
+def factor(a, u, w, corner):
+    """Factors of a pentadiagonal matrix, in place: a (n,), u, w (n,) of which the last and the last two are not used, corner
+    (2,)."""
+    n = a.size
+    if n < FEW:
+        factor_few(a, u, w, corner)
+        return
+    p = (n - 1) // 2
+    last = n - 1
+    # the ends, with their corners
+    top, low = reciprocal(a[0]), reciprocal(a[last])
+    third, second, first = corner[0], w[0], u[0]
+    corner[0], w[0], u[0], a[0] = third * top, second * top, first * top, top
+    a[3] -= corner[0] * third
+    u[2] -= w[0] * third
+    a[2] -= w[0] * second
+    w[1] -= u[0] * third
+    u[1] -= u[0] * second
+    a[1] -= u[0] * first
+    third, second, first = corner[1], w[last - 2], u[last - 1]
+    corner[1], w[last - 2], u[last - 1], a[last] = third * low, second * low, first * low, low
+    a[last - 3] -= corner[1] * third
+    u[last - 3] -= w[last - 2] * third
+    a[last - 2] -= w[last - 2] * second
+    w[last - 3] -= u[last - 1] * third
+    u[last - 2] -= u[last - 1] * second
+    a[last - 1] -= u[last - 1] * first
+    # rows i downwards and j upwards; what the next rows need stays in registers
+    a0, a1, u0 = a[1], a[2], u[1]
+    z0, z1, v0 = a[last - 1], a[last - 2], u[last - 2]
+    for i in range(1, n // 2 - 1):
+        j = last - i
+        top, low = reciprocal(a0), reciprocal(z0)
+        second, below = w[i], w[j - 2]
+        l1, l2 = u0 * top, second * top
+        m1, m2 = v0 * low, below * low
+        a[i], u[i], w[i] = top, l1, l2
+        a[j], u[j - 1], w[j - 2] = low, m1, m2
+        a0 = a1 - l1 * u0
+        a1 = a[i + 2] - l2 * second
+        u0 = u[i + 1] - l1 * second
+        z0 = z1 - m1 * v0
+        z1 = a[j - 2] - m2 * below
+        v0 = u[j - 2] - m1 * below
+    i = n // 2 - 1
+    if n % 2:  # one row more from above
+        top = reciprocal(a0)
+        second = w[i]
+        l1, l2 = u0 * top, second * top
+        a[i], u[i], w[i] = top, l1, l2
+        a0 = a1 - l1 * u0
+        a1 = a[i + 2] - l2 * second
+        u0 = u[i + 1] - l1 * second
+    # a0, a1 came down to p and p + 1; z1, z0 came up to them, on the same entries
+    a0 += z1 - a[p]
+    a1 += z0 - a[p + 1]
+    u0 += v0 - u[p]
+    a[p] = reciprocal(a0)
+    u[p] = u0 * a[p]
+    a[p + 1] = reciprocal(a1 - u[p] * u0)
+
+
+@part
+def substitute(a, u, w, corner, b):
+    """Solve with the factors of `factor`, b (n,) in place."""
+    n = a.size
+    if n < FEW:
+        substitute_few(a, u, w, corner, b)
+        return
+    p = (n - 1) // 2
+    last = n - 1
+    b[1] -= u[0] * b[0]
+    b[2] -= w[0] * b[0]
+    b[3] -= corner[0] * b[0]
+    b[last - 1] -= u[last - 1] * b[last]
+    b[last - 2] -= w[last - 2] * b[last]
+    b[last - 3] -= corner[1] * b[last]
+    b0, b1 = b[1], b[2]
+    c0, c1 = b[last - 1], b[last - 2]
+    for i in range(1, n // 2 - 1):
+        j = last - i
+        b[i], b[j] = b0, c0
+        b0, b1 = b1 - u[i] * b0, b[i + 2] - w[i] * b0
+        c0, c1 = c1 - u[j - 1] * c0, b[j - 2] - w[j - 2] * c0
+    i = n // 2 - 1
+    if n % 2:
+        b[i] = b0
+        b0, b1 = b1 - u[i] * b0, b[i + 2] - w[i] * b0
+    b0 += c1 - b[p]
+    b1 += c0 - b[p + 1]
+    b1 = (b1 - u[p] * b0) * a[p + 1]
+    b0 = b0 * a[p] - u[p] * b1
+    b[p], b[p + 1] = b0, b1
+    c0, c1 = b1, b0  # the nearest and the next solved below row j; b0, b1 above row i
+    if n % 2:
+        i = p - 1
+        b0, b1 = (b[i] * a[i] - w[i] * b1) - u[i] * b0, b0
+        b[i] = b0
+    for i in range(n // 2 - 2, 0, -1):
+        j = last - i
+        b0, b1 = (b[i] * a[i] - w[i] * b1) - u[i] * b0, b0
+        c0, c1 = (b[j] * a[j] - w[j - 2] * c1) - u[j - 1] * c0, c0
+        b[i], b[j] = b0, c0
+    b[0] = (b[0] * a[0] - corner[0] * b[3] - w[0] * b[2]) - u[0] * b[1]
+    b[last] = (b[last] * a[last] - corner[1] * b[last - 3] - w[last - 2] * b[last - 2]) - u[last - 1] * b[last - 1]

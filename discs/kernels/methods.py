@@ -1,0 +1,348 @@
+"""The integrators in compiled form, for every chain; their plain twins are in `discs.integrators`.
+
+Each takes `steps` steps from hi + lo and pi (or what the method remembers), in place, and returns (taken, gradients, solves,
+unconverged, lost): it stops after a step whose kinetic energy is not below `bound`, or in which disc `lost` >= 0 loses its heading.
+"""
+
+import numpy as np
+
+from discs.kernels import chain as do
+from discs.kernels.compiled import kernel, part
+from discs.kernels.shared import add, back, copy, forward, largest, renew
+
+
+@part
+def kinetic(pi):
+    total = 0.0
+    for row in range(pi.shape[0]):
+        for i in range(pi.shape[1]):
+            total += pi[row, i] * pi[row, i]
+    return 0.5 * total
+
+
+@kernel
+def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
+    """Midpoint steps of fractions of h, `discs.integrators.midpoint` and `composition`."""
+    work, p, move = do.workspace(chain), np.empty_like(pi), np.empty_like(hi)
+    still, slope, change = np.zeros_like(hi), np.zeros((2, hi.shape[1])), np.empty(hi.shape[1])
+    solves, unconverged, lost = 0, 0, -1
+    do.settle(chain, work, hi, lo)
+    do.lost(chain, work, slope)
+    for step in range(steps):
+        for fraction in fractions:
+            tau = fraction * h
+            do.frame(chain, work, still, work.c)
+            copy(pi, p)
+            renew(work.c, p, 0.5 * tau, move, chain.scale, change)
+            sweep, change_of_move = 0, np.inf
+            while sweep < sweeps and not change_of_move <= tolerance:
+                change_of_move = do.sweep(chain, work, tau, pi, p, move)
+                sweep += 1
+            solves += sweep
+            unconverged += tolerance > 0 and sweep == sweeps
+            add(hi, lo, move, 2.0)
+            for row in range(pi.shape[0]):
+                for i in range(pi.shape[1]):
+                    pi[row, i] = 2 * p[row, i] - pi[row, i]
+            do.settle(chain, work, hi, lo)
+        lost = do.lost(chain, work, slope)
+        if lost >= 0 or not kinetic(pi) <= bound:
+            return step + 1, solves, solves, unconverged, lost
+    return steps, solves, solves, unconverged, lost
+
+
+@part
+def combine(weights, parts, h, total):
+    """total = h sum_j weights[j] parts[j], (rows, n)."""
+    for row in range(total.shape[0]):
+        to = total[row]
+        a, x = h * weights[0], parts[0, row]
+        for i in range(to.size):
+            to[i] = a * x[i]
+        for j in range(1, weights.size):
+            a, x = h * weights[j], parts[j, row]
+            for i in range(to.size):
+                to[i] += a * x[i]
+
+
+@part
+def transform(weights, parts, out):
+    """out = sum_j weights[j] parts[j], real or complex, (columns, n)."""
+    for row in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            out[row, i] = weights[0] * parts[0, row, i]
+        for j in range(1, weights.size):
+            for i in range(out.shape[1]):
+                out[row, i] += weights[j] * parts[j, row, i]
+
+
+@part
+def spread(weights, z, parts):
+    """parts[j] += weights[j] z for real ones; twice the real part of it for complex ones, which stand for themselves and their
+    conjugates."""
+    for j in range(weights.size):
+        for row in range(z.shape[0]):
+            to, x = parts[j, row], z[row]
+            for i in range(to.size):
+                to[i] += (weights[j] * x[i]).real
+
+
+@part
+def reach(c, p, tau, scale, change):
+    """The largest entry of tau C p, each row in units of its `scale`."""
+    furthest = 0.0
+    for row in range(c.shape[0]):
+        a, q = c[row], p[row // 3]
+        for i in range(change.size):
+            change[i] = abs(tau * a[i] * q[i])
+        furthest = max(furthest, largest(change) / scale[row])
+    return furthest
+
+
+@kernel
+def gauss(chain, hi, lo, pi, tableau, h, steps, sweeps, tolerance, bound):
+    """Gauss collocation, `discs.integrators.gauss`, which says what the tableau is."""
+    a, b, last, real, real_in, real_out, pairs, pairs_in, pairs_out = tableau
+    rows, n = hi.shape
+    columns, s = pi.shape[0], b.size
+    work, c, still, move = do.workspace(chain), np.empty_like(hi), np.zeros_like(hi), np.empty_like(hi)
+    p, force, rest = np.empty((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n))
+    stages, v = np.empty((s, rows, n)), np.empty((s, rows, n))
+    x, z = np.empty((columns, n)), np.empty((columns, n), np.complex128)
+    slope, change = np.zeros((2, n)), np.empty(n)
+    stiff, single, first, second = do.factors(chain, 1.0), do.factors(chain, 1.0), do.factors(chain, 1.0j), do.factors(chain, 1.0j)
+    gradients, solves, unconverged, lost = 0, 0, 0, -1
+    do.settle(chain, work, hi, lo)
+    do.lost(chain, work, slope)
+    for step in range(steps):
+        do.frame(chain, work, still, c)
+        renew(c, pi, 0.5 * h, move, chain.scale, change)
+        do.frame(chain, work, move, c)
+        do.stiffness(chain, work, move, c, stiff)
+        if real.size:
+            do.precondition(chain, stiff, h * h * real[0] ** 2, single)
+        do.precondition(chain, stiff, h * h * pairs[0] ** 2, first)
+        if pairs.size > 1:
+            do.precondition(chain, stiff, h * h * pairs[1] ** 2, second)
+        for i in range(s):
+            copy(pi, p[i])
+            forward(c, p[i], v[i])
+        sweep, moved = 0, np.inf
+        while sweep < sweeps and not moved <= tolerance:
+            sweep += 1
+            # C where the stages are, velocities by it, and forces where these lead
+            for i in range(s):
+                combine(a[i], v, h, move)
+                do.frame(chain, work, move, stages[i])
+            for i in range(s):
+                forward(stages[i], p[i], v[i])
+            for i in range(s):
+                combine(a[i], v, h, move)
+                do.pullback(chain, work, move, stages[i], force[i])
+            for i in range(s):
+                combine(a[i], force, -h, rest[i])
+                for row in range(columns):
+                    for k in range(n):
+                        rest[i, row, k] += pi[row, k] - p[i, row, k]
+            # the change of p, eigenvector by eigenvector
+            force[:] = 0.0
+            if real.size:
+                transform(real_in[0], rest, x)
+                do.correct(chain, single, x)
+                spread(real_out[0], x, force)
+            transform(pairs_in[0], rest, z)
+            do.correct(chain, first, z)
+            spread(pairs_out[0], z, force)
+            if pairs.size > 1:
+                transform(pairs_in[1], rest, z)
+                do.correct(chain, second, z)
+                spread(pairs_out[1], z, force)
+            moved = 0.0
+            for i in range(s):
+                moved = max(moved, reach(c, force[i], 0.5 * h, chain.scale, change))
+                for row in range(columns):
+                    for k in range(n):
+                        p[i, row, k] += force[i, row, k]
+                forward(stages[i], p[i], v[i])
+        gradients += s * sweep
+        solves += sweep * (real.size + pairs.size)
+        unconverged += tolerance > 0 and sweep == sweeps
+        combine(b, v, h, move)
+        add(hi, lo, move, 1.0)
+        for row in range(columns):
+            for k in range(n):
+                start, total = pi[row, k], 0.0
+                for i in range(s):
+                    total += last[i] * (p[i, row, k] - start)
+                pi[row, k] = start + total
+        do.settle(chain, work, hi, lo)
+        lost = do.lost(chain, work, slope)
+        if lost >= 0 or not kinetic(pi) <= bound:
+            return step + 1, gradients, solves, unconverged, lost
+    return steps, gradients, solves, unconverged, lost
+
+
+@kernel
+def rk4(chain, hi, lo, pi, h, steps, bound):
+    """The classical Runge-Kutta method, `discs.integrators.rk4`."""
+    work, c, move = do.workspace(chain), np.empty_like(hi), np.empty_like(hi)
+    v, total, g, kick, p = np.empty_like(hi), np.empty_like(hi), np.empty_like(pi), np.empty_like(pi), np.empty_like(pi)
+    slope, lost = np.zeros((2, hi.shape[1])), -1
+    nodes, weights = np.array([0.5, 0.5, 1.0, 0.0]), np.array([1.0, 2.0, 2.0, 1.0])
+    do.settle(chain, work, hi, lo)
+    do.lost(chain, work, slope)
+    for step in range(steps):
+        move[:], total[:], kick[:] = 0.0, 0.0, 0.0
+        copy(pi, p)
+        for i in range(4):
+            do.frame(chain, work, move, c)
+            forward(c, p, v)
+            do.pullback(chain, work, move, c, g)
+            for row in range(v.shape[0]):
+                for k in range(v.shape[1]):
+                    total[row, k] += weights[i] * v[row, k]
+                    move[row, k] = nodes[i] * h * v[row, k]
+            for row in range(g.shape[0]):
+                for k in range(g.shape[1]):
+                    kick[row, k] += weights[i] * g[row, k]
+                    p[row, k] = pi[row, k] - nodes[i] * h * g[row, k]
+        add(hi, lo, total, h / 6)
+        for row in range(pi.shape[0]):
+            for k in range(pi.shape[1]):
+                pi[row, k] -= h / 6 * kick[row, k]
+        do.settle(chain, work, hi, lo)
+        lost = do.lost(chain, work, slope)
+        if lost >= 0 or not kinetic(pi) <= bound:
+            return step + 1, 4 * (step + 1), 0, 0, lost
+    return steps, 4 * steps, 0, 0, lost
+
+
+@kernel
+def leapfrog(chain, hi, lo, last, following, h, steps, bound):
+    """The paper's two-step scheme, `discs.integrators.leapfrog`; last and following are the moves before and after hi + lo."""
+    work, c, still, g = do.workspace(chain), np.empty_like(hi), np.zeros_like(hi), np.empty_like(hi)
+    p, slope, lost = np.empty((hi.shape[0] - 2, hi.shape[1])), np.zeros((2, hi.shape[1])), -1
+    do.settle(chain, work, hi, lo)
+    do.lost(chain, work, slope)
+    for step in range(steps):
+        add(hi, lo, following, 1.0)
+        do.settle(chain, work, hi, lo)
+        do.frame(chain, work, still, c)
+        do.gradient(chain, work, still, g)
+        energy = 0.0
+        for row in range(g.shape[0]):
+            for k in range(g.shape[1]):
+                g[row, k] = 2 * chain.weights[row, k] * following[row, k] - h * h * g[row, k]
+        back(c, g, p)
+        copy(following, last)
+        forward(c, p, following)
+        for row in range(g.shape[0]):
+            for k in range(g.shape[1]):
+                following[row, k] -= last[row, k]
+                energy += chain.weights[row, k] * following[row, k] * following[row, k]
+        lost = do.lost(chain, work, slope)
+        if lost >= 0 or not 0.5 * energy / (h * h) <= bound:
+            return step + 1, step + 1, 0, 0, lost
+    return steps, steps, 0, 0, lost
+
+
+@kernel
+def perlmutter(chain, hi, lo, pi, h, steps, sweeps, tolerance, bound):
+    """The reversible scheme of McLachlan and Perlmutter, `discs.integrators.perlmutter`."""
+    work, c, after, still = do.workspace(chain), np.empty_like(hi), np.empty_like(hi), np.zeros_like(hi)
+    half, move, v, g = np.empty_like(hi), np.empty_like(hi), np.empty_like(hi), np.empty_like(hi)
+    pull, share, ones = np.empty_like(pi), np.empty_like(pi), np.ones_like(pi)
+    slope, change = np.zeros((2, hi.shape[1])), np.empty(hi.shape[1])
+    unconverged, lost = 0, -1
+    do.settle(chain, work, hi, lo)
+    do.lost(chain, work, slope)
+    for step in range(steps):
+        do.frame(chain, work, still, c)
+        forward(c, pi, v)
+        for row in range(v.shape[0]):
+            for k in range(v.shape[1]):
+                half[row, k] = 0.5 * h * v[row, k]
+                move[row, k] = 2 * half[row, k]
+        do.frame(chain, work, half, c)
+        do.gradient(chain, work, half, g)
+        for row in range(v.shape[0]):
+            for k in range(v.shape[1]):
+                g[row, k] = chain.weights[row, k] * v[row, k] - h * g[row, k]
+        back(c, g, pull)
+        sweep, moved = 0, np.inf
+        while sweep < sweeps and not moved <= tolerance:
+            sweep += 1
+            do.frame(chain, work, move, after)
+            forward(after, ones, v)
+            for row in range(v.shape[0]):
+                for k in range(v.shape[1]):
+                    v[row, k] *= chain.weights[row, k]
+            back(c, v, share)
+            for row in range(pi.shape[0]):
+                for k in range(pi.shape[1]):
+                    pi[row, k] = pull[row, k] / share[row, k]
+            forward(after, pi, v)
+            moved = 0.0
+            for row in range(v.shape[0]):
+                for k in range(v.shape[1]):
+                    new = half[row, k] + 0.5 * h * v[row, k]
+                    change[k] = abs(new - move[row, k])
+                    move[row, k] = new
+                moved = max(moved, largest(change) / chain.scale[row])
+        unconverged += tolerance > 0 and sweep == sweeps
+        add(hi, lo, move, 1.0)
+        do.settle(chain, work, hi, lo)
+        lost = do.lost(chain, work, slope)
+        if lost >= 0 or not kinetic(pi) <= bound:
+            return step + 1, step + 1, 0, unconverged, lost
+    return steps, steps, 0, unconverged, lost
+
+
+@kernel
+def rates(chain, hi, lo, pi, v):
+    """v = C pi at hi + lo."""
+    work, c = do.workspace(chain), np.empty_like(hi)
+    do.settle(chain, work, hi, lo)
+    do.frame(chain, work, np.zeros_like(hi), c)
+    forward(c, pi, v)
+
+
+@kernel
+def observe(chain, hi, lo, v, q):
+    """q = hi + lo; returns the energy and the largest slip |r. - e omega| at rates v."""
+    work, c = do.workspace(chain), np.empty_like(hi)
+    do.settle(chain, work, hi, lo)
+    do.frame(chain, work, np.zeros_like(hi), c)
+    energy, slip = do.potential(chain, work), 0.0
+    for row in range(hi.shape[0]):
+        for i in range(hi.shape[1]):
+            q[row, i] = hi[row, i] + lo[row, i]
+            energy += 0.5 * chain.weights[row, i] * v[row, i] * v[row, i]
+    for i in range(hi.shape[1]):
+        x, y = v[0, i] - c[0, i] / c[2, i] * v[2, i], v[1, i] - c[1, i] / c[2, i] * v[2, i]
+        slip = max(slip, np.sqrt(x * x + y * y))
+    return energy, slip
+
+
+@kernel
+def reduced(chain, y, out):
+    """The reduced equations q. = C pi, pi. = -C^T grad V for y = (q, pi), disc by disc, (n (rows + columns),)."""
+    n, rows = chain.radius.size, chain.scale.size
+    columns = rows - 2
+    work, hi, v, c = do.workspace(chain), np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n))
+    still, p, g = np.zeros((rows, n)), np.empty((columns, n)), np.empty((columns, n))
+    width = rows + columns
+    for i in range(n):
+        for row in range(rows):
+            hi[row, i] = y[width * i + row]
+        for row in range(columns):
+            p[row, i] = y[width * i + rows + row]
+    do.settle(chain, work, hi, still)
+    do.frame(chain, work, still, c)
+    forward(c, p, v)
+    do.pullback(chain, work, still, c, g)
+    for i in range(n):
+        for row in range(rows):
+            out[width * i + row] = v[row, i]
+        for row in range(columns):
+            out[width * i + rows + row] = -g[row, i]

@@ -1,0 +1,380 @@
+"""The chain of slaved headings, linear curvature, in compiled form; its derivation and its plain twin are `discs.slaved`.
+
+Links are held with one more at each end: link j lies before disc j, link j + 1 after it. Around a ring links 0 and n are the
+same; at free
+ends they are the ghosts that make the headings there central, d_0 = 2 d_1 - d_2 ("springs", "paper") or 3 d_1 - 3 d_2 + d_3
+("consistent").
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.chain import Chain
+from discs.kernels import banded, chain
+from discs.kernels.compiled import fill, part
+from discs.kernels.shared import renew
+
+PLAIN, GHOST, RING = 0, 1, 2
+
+
+class Slaved(NamedTuple):
+    """Parameters. radius : (n,). weights : (3, n), inertia against each row's rate. bend : (n,), K w/k**4, against the
+    difference of a
+    disc's links. torsion : (n + 1,), beta/k.
+
+    hessian : (3, n), grad^2 V by x or y: diagonal, i with i + 1, i with i + 2. corner : (2,), 0 with 3 and n - 4 with n - 1.
+    twist : (2, n), by theta: diagonal, i with i + 1.
+    """
+
+    radius: NDArray
+    weights: NDArray
+    bend: NDArray
+    torsion: NDArray
+    hessian: NDArray
+    corner: NDArray
+    twist: NDArray
+    scale: NDArray
+    shift: NDArray
+    k: float
+    ends: int
+    unit: bool
+
+
+def parameters(given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, hessians: tuple[Any, Any]) -> Slaved:
+    """The parameters of a chain; `hessians` are grad^2 V by x or y and by theta, sparse (n, n)."""
+    n, k, ring = given.n, given.k, given.ends == "ring"
+    bend, torsion = np.zeros(n), np.zeros(n + 1)
+    stiffness = np.asarray(given.bending_stiffness) * given.bend_shares / k**4
+    bend[(n - stiffness.size) // 2 :][: stiffness.size] = stiffness
+    torsion[1 : n + ring] = np.asarray(given.torsion_stiffness) / k
+    torsion[0] = torsion[n]
+    here = np.arange(n)
+    hessian, twist = ([matrix[here, (here + j) % n] for j in range(3)] for matrix in hessians)
+    corner = np.zeros(2)
+    if given.ends == "consistent":
+        corner[:] = hessians[0][0, 3], hessians[0][n - 4, n - 1] if n > 4 else 0.0
+    return Slaved(
+        radius=np.array(given.radius),
+        weights=weights,
+        bend=bend,
+        torsion=torsion,
+        hessian=np.array(hessian),
+        corner=corner,
+        twist=np.array(twist[:2]),
+        scale=scale,
+        shift=shift,
+        k=k,
+        ends=RING if ring else GHOST if given.ends == "consistent" else PLAIN,
+        unit=given.rolling == "unit",
+    )
+
+
+class Work(NamedTuple):
+    """base : links of the base position. links, tension : of a position. c : C. rhs : (1, n). matrix : real factors."""
+
+    base: NDArray
+    links: NDArray
+    tension: NDArray
+    c: NDArray
+    rhs: NDArray
+    matrix: "Matrix"
+
+
+class Matrix(NamedTuple):
+    """A factored matrix: `banded`, and around a ring the columns of the last two discs, which border the rest.
+
+    columns : (2, n), solutions for the border; edge : (9,), the border's six entries and the inverse of its Schur complement.
+    """
+
+    a: NDArray
+    u: NDArray
+    w: NDArray
+    corner: NDArray
+    columns: NDArray
+    edge: NDArray
+
+
+@fill(chain.workspace, Slaved, _nrt=True)
+def _workspace(chain):
+    n = chain.radius.size
+    matrix = Matrix(np.empty(n), np.empty(n), np.empty(n), np.empty(2), np.empty((2, n)), np.empty(9))
+    return Work(np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.empty((3, n)), np.empty((1, n)), matrix)
+
+
+@fill(chain.factors, Slaved, _nrt=True)
+def _factors(chain, g):
+    n, kind = chain.radius.size, np.array([g])
+    new = np.empty(3 * n, kind.dtype), np.empty(2, kind.dtype), np.empty((2, n), kind.dtype), np.empty(9, kind.dtype)
+    return Matrix(new[0][:n], new[0][n : 2 * n], new[0][2 * n :], new[1], new[2], new[3])
+
+
+@part
+def close_ends(ends, d):
+    """The first and last links from the others, rows x and y."""
+    n = d.shape[1] - 1
+    for row in range(2):
+        if ends == RING:
+            d[row, 0] = d[row, n]
+        elif ends == GHOST:
+            d[row, 0] = 3 * (d[row, 1] - d[row, 2]) + d[row, 3]
+            d[row, n] = 3 * (d[row, n - 1] - d[row, n - 2]) + d[row, n - 3]
+        else:
+            d[row, 0] = 2 * d[row, 1] - d[row, 2]
+            d[row, n] = 2 * d[row, n - 1] - d[row, n - 2]
+    d[2, 0] = d[2, n]
+
+
+@fill(chain.settle, Slaved)
+def _settle(chain, work, hi, lo):
+    d = work.base
+    n = hi.shape[1]
+    for row in range(3):
+        x, e, to = hi[row], lo[row], d[row]
+        for j in range(1, n):
+            to[j] = (x[j] - x[j - 1]) + (e[j] - e[j - 1])
+        if chain.ends == RING:
+            to[n] = (x[0] - x[n - 1]) + (e[0] - e[n - 1]) + chain.shift[row]
+    close_ends(chain.ends, d)
+
+
+@part
+def moved(chain, base, move, d, rows):
+    """Links after a move, the first `rows` rows."""
+    n = move.shape[1]
+    for row in range(rows):
+        y, b, to = move[row], base[row], d[row]
+        for j in range(1, n):
+            to[j] = b[j] + (y[j] - y[j - 1])
+        if chain.ends == RING:
+            to[n] = b[n] + (y[0] - y[n - 1])
+    close_ends(chain.ends, d)
+
+
+@part
+def frame_of(chain, d, c):
+    """C of links: e = R J r' or R J r'/|r'|, r' = (d_i + d_{i+1})/2k."""
+    n = c.shape[1]
+    dx, dy, cx, cy, ct = d[0], d[1], c[0], c[1], c[2]
+    radius, mass, spin = chain.radius, chain.weights[0], chain.weights[2]
+    half = 0.5 / chain.k
+    if chain.unit:
+        for i in range(n):
+            x, y = dx[i] + dx[i + 1], dy[i] + dy[i + 1]
+            e = radius[i] / np.sqrt(x * x + y * y)
+            t = 1 / np.sqrt(spin[i] + mass[i] * (radius[i] * radius[i]))
+            ct[i], cx[i], cy[i] = t, -y * (e * t), x * (e * t)
+    else:
+        for i in range(n):
+            e = radius[i] * half
+            x, y = (dx[i] + dx[i + 1]) * e, (dy[i] + dy[i + 1]) * e
+            t = 1 / np.sqrt(spin[i] + mass[i] * (x * x + y * y))
+            ct[i], cx[i], cy[i] = t, -y * t, x * t
+
+
+@part
+def tensions(chain, d, g):
+    """Derivative of V by the links, (3, n + 1), ghosts folded back to the links that they are made of."""
+    n = d.shape[1] - 1
+    bend = chain.bend
+    for row in range(2):
+        x, to = d[row], g[row]
+        # moments bend (d_{i+1} - d_i) of two discs pull at the link between them
+        before = bend[0] * (x[1] - x[0])
+        to[0] = -before
+        for j in range(1, n):
+            to[j] = bend[j - 1] * (x[j] - x[j - 1]) - bend[j] * (x[j + 1] - x[j])
+        to[n] = bend[n - 1] * (x[n] - x[n - 1])
+        if chain.ends == RING:
+            to[n] += to[0]
+            to[0] = to[n]
+        elif chain.ends == GHOST:
+            first, last = to[0], to[n]
+            to[1] += 3 * first
+            to[2] -= 3 * first
+            to[3] += first
+            to[n - 1] += 3 * last
+            to[n - 2] -= 3 * last
+            to[n - 3] += last
+            to[0], to[n] = 0.0, 0.0
+    theta, to = d[2], g[2]
+    for j in range(n + 1):
+        to[j] = chain.torsion[j] * theta[j]
+
+
+@fill(chain.frame, Slaved)
+def _frame(chain, work, move, c):
+    moved(chain, work.base, move, work.links, 2)
+    frame_of(chain, work.links, c)
+
+
+@fill(chain.gradient, Slaved)
+def _gradient(chain, work, move, g):
+    moved(chain, work.base, move, work.links, 3)
+    tensions(chain, work.links, work.tension)
+    for row in range(3):
+        x, to = work.tension[row], g[row]
+        for i in range(to.size):
+            to[i] = x[i] - x[i + 1]
+
+
+@fill(chain.pullback, Slaved)
+def _pullback(chain, work, move, c, g):
+    moved(chain, work.base, move, work.links, 3)
+    tensions(chain, work.links, work.tension)
+    x, y, z = work.tension
+    cx, cy, ct, to = c[0], c[1], c[2], g[0]
+    for i in range(to.size):
+        to[i] = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (z[i] - z[i + 1])
+
+
+@part
+def assemble(chain, c, one, g, a, u, w, corner):
+    """Entries of `one` I + g C^T (grad^2 V) C."""
+    n = a.size
+    cx, cy, ct = c[0], c[1], c[2]
+    s0, s1, s2 = chain.hessian[0], chain.hessian[1], chain.hessian[2]
+    t0, t1 = chain.twist[0], chain.twist[1]
+    for i in range(n):
+        a[i] = one + g * (s0[i] * (cx[i] * cx[i] + cy[i] * cy[i]) + t0[i] * (ct[i] * ct[i]))
+    for i in range(n - 1):
+        u[i] = g * (s1[i] * (cx[i] * cx[i + 1] + cy[i] * cy[i + 1]) + t1[i] * (ct[i] * ct[i + 1]))
+    for i in range(n - 2):
+        w[i] = g * (s2[i] * (cx[i] * cx[i + 2] + cy[i] * cy[i + 2]))
+    u[n - 1], w[n - 2], w[n - 1] = 0.0, 0.0, 0.0
+    if chain.ends == RING:
+        u[n - 1] = g * (s1[n - 1] * (cx[n - 1] * cx[0] + cy[n - 1] * cy[0]) + t1[n - 1] * (ct[n - 1] * ct[0]))
+        w[n - 2] = g * (s2[n - 2] * (cx[n - 2] * cx[0] + cy[n - 2] * cy[0]))
+        w[n - 1] = g * (s2[n - 1] * (cx[n - 1] * cx[1] + cy[n - 1] * cy[1]))
+    corner[0] = corner[1] = 0
+    if chain.ends == GHOST:
+        corner[0] = g * (chain.corner[0] * (cx[0] * cx[3] + cy[0] * cy[3]))
+        corner[1] = g * (chain.corner[1] * (cx[n - 4] * cx[n - 1] + cy[n - 4] * cy[n - 1]))
+
+
+@part
+def border(m):
+    """Factor a ring's matrix: the chain without its last two discs, and what they add."""
+    n = m.a.size
+    edge = m.edge
+    edge[0], edge[1], edge[2] = m.w[n - 4], m.u[n - 3], m.w[n - 2]  # disc n - 2 with n - 4, n - 3, 0
+    edge[3], edge[4], edge[5] = m.w[n - 3], m.u[n - 1], m.w[n - 1]  # disc n - 1 with n - 3, 0, 1
+    banded.factor(m.a[: n - 2], m.u[: n - 2], m.w[: n - 2], m.corner)
+    first, second = m.columns[0, : n - 2], m.columns[1, : n - 2]
+    first[:], second[:] = 0, 0
+    first[n - 4] += edge[0]
+    first[n - 3] += edge[1]
+    first[0] += edge[2]
+    second[n - 3] += edge[3]
+    second[0] += edge[4]
+    second[1] += edge[5]
+    banded.substitute(m.a[: n - 2], m.u[: n - 2], m.w[: n - 2], m.corner, first)
+    banded.substitute(m.a[: n - 2], m.u[: n - 2], m.w[: n - 2], m.corner, second)
+    x = m.a[n - 2] - (edge[0] * first[n - 4] + edge[1] * first[n - 3] + edge[2] * first[0])
+    y = m.u[n - 2] - (edge[0] * second[n - 4] + edge[1] * second[n - 3] + edge[2] * second[0])
+    z = m.a[n - 1] - (edge[3] * second[n - 3] + edge[4] * second[0] + edge[5] * second[1])
+    det = banded.reciprocal(x * z - y * y)
+    edge[6], edge[7], edge[8] = z * det, -y * det, x * det
+
+
+@part
+def factor(chain, m):
+    if chain.ends == RING:
+        border(m)
+    else:
+        banded.factor(m.a, m.u, m.w, m.corner)
+
+
+@part
+def solve(chain, m, b):
+    if chain.ends != RING:
+        banded.substitute(m.a, m.u, m.w, m.corner, b)
+        return
+    n = b.size
+    edge = m.edge
+    banded.substitute(m.a[: n - 2], m.u[: n - 2], m.w[: n - 2], m.corner, b[: n - 2])
+    x = b[n - 2] - (edge[0] * b[n - 4] + edge[1] * b[n - 3] + edge[2] * b[0])
+    y = b[n - 1] - (edge[3] * b[n - 3] + edge[4] * b[0] + edge[5] * b[1])
+    x, y = edge[6] * x + edge[7] * y, edge[7] * x + edge[8] * y
+    first, second = m.columns[0], m.columns[1]
+    for i in range(n - 2):
+        b[i] -= first[i] * x + second[i] * y
+    b[n - 2], b[n - 1] = x, y
+
+
+@fill(chain.sweep, Slaved)
+def _sweep(chain, work, h, pi, p, move):
+    n = p.shape[1]
+    c, q, b, m = work.c, p[0], work.rhs[0], work.matrix
+    moved(chain, work.base, move, work.links, 2)
+    frame_of(chain, work.links, c)
+    half = 0.5 * h
+    # links of the half step that this C makes
+    for row in range(3):
+        f, base, to = c[row], work.base[row], work.links[row]
+        for j in range(1, n):
+            to[j] = base[j] + half * (f[j] * q[j] - f[j - 1] * q[j - 1])
+        if chain.ends == RING:
+            to[n] = base[n] + half * (f[0] * q[0] - f[n - 1] * q[n - 1])
+    close_ends(chain.ends, work.links)
+    tensions(chain, work.links, work.tension)
+    x, y, z = work.tension
+    cx, cy, ct = c
+    first = pi[0]
+    for i in range(n):
+        pull = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (z[i] - z[i + 1])
+        b[i] = first[i] - q[i] - half * pull
+    assemble(chain, c, 1.0, half * half, m.a, m.u, m.w, m.corner)
+    factor(chain, m)
+    solve(chain, m, b)
+    for i in range(n):
+        q[i] += b[i]
+    return renew(c, p, half, move, chain.scale, b)
+
+
+@fill(chain.stiffness, Slaved)
+def _stiffness(chain, work, move, c, matrix):
+    assemble(chain, c, 0.0, 1.0, matrix.a, matrix.u, matrix.w, matrix.corner)
+
+
+@fill(chain.precondition, Slaved)
+def _precondition(chain, stiff, g, matrix):
+    for i in range(stiff.a.size):
+        matrix.a[i] = 1 + g * stiff.a[i]
+        matrix.u[i] = g * stiff.u[i]
+        matrix.w[i] = g * stiff.w[i]
+    matrix.corner[0], matrix.corner[1] = g * stiff.corner[0], g * stiff.corner[1]
+    factor(chain, matrix)
+
+
+@fill(chain.correct, Slaved)
+def _correct(chain, matrix, r):
+    solve(chain, matrix, r[0])
+
+
+@fill(chain.potential, Slaved)
+def _potential(chain, work):
+    d, n = work.base, chain.radius.size
+    total = 0.0
+    for i in range(n):
+        x, y = d[0, i + 1] - d[0, i], d[1, i + 1] - d[1, i]
+        total += chain.bend[i] * (x * x + y * y) + chain.torsion[i + 1] * d[2, i + 1] ** 2
+    return 0.5 * total
+
+
+@fill(chain.lost, Slaved)
+def _lost(chain, work, slope):
+    d, half, worst, disc = work.base, 0.5 / chain.k, 1e-6, -1
+    if not chain.unit:
+        return disc
+    for i in range(slope.shape[1]):
+        ax, ay = slope[0, i], slope[1, i]
+        bx, by = (d[0, i] + d[0, i + 1]) * half, (d[1, i] + d[1, i + 1]) * half
+        mx, my = bx - ax, by - ay
+        part = min(max(-(ax * mx + ay * my) / max(mx * mx + my * my, 1e-300), 0.0), 1.0)
+        nearest = (ax + part * mx) ** 2 + (ay + part * my) ** 2
+        if nearest < worst:
+            worst, disc = nearest, i
+        slope[0, i], slope[1, i] = bx, by
+    return disc

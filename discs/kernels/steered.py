@@ -1,0 +1,491 @@
+"""The chain of discs with their own heading in compiled form; its derivation and its plain twin are `discs.steered`.
+
+Links are held with one more at each end: link j lies before disc j. Around a ring links 0 and n are the same; at free ends
+they have
+no stiffness. The cosines of a step's angles come from those of its start and of the step: two pairs for each disc and sweep.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.chain import SteeredChain
+from discs.kernels import blocks, chain
+from discs.kernels.banded import reciprocal
+from discs.kernels.compiled import fill, part
+from discs.kernels.shared import forward, renew
+
+
+class Steered(NamedTuple):
+    """Parameters. radius : (n,). weights : (4, n), inertia against each row's rate. roots : (2, n), of the inertia against
+    roll and turning.
+
+    stiffness : (4, n + 1), k times that against stretch, shear, torsion and bending. shift : (4,), advance along a ring.
+    """
+
+    radius: NDArray
+    weights: NDArray
+    roots: NDArray
+    stiffness: NDArray
+    scale: NDArray
+    shift: NDArray
+    k: float
+    ring: bool
+
+
+def parameters(
+    given: SteeredChain, weights: NDArray, roots: NDArray, scale: NDArray, shift: NDArray, stiffness: NDArray
+) -> Steered:
+    """The parameters of a chain; `stiffness` is that of its links, (4, n_links)."""
+    ring = given.ends == "ring"
+    padded = np.zeros((4, given.n + 1))
+    padded[:, 1 : 1 + stiffness.shape[1]] = stiffness
+    padded[:, 0] = padded[:, -1]
+    return Steered(np.array(given.radius), weights, roots, padded, scale, shift, given.k, ring)
+
+
+class Matrix(NamedTuple):
+    """A factored matrix: `blocks`, and around a ring the columns of the last disc, which borders the rest.
+
+    columns : (2, 2, n), solutions for the border; edge : (11,), the border's two blocks and the inverse of its Schur complement.
+    """
+
+    d: NDArray
+    o: NDArray
+    columns: NDArray
+    edge: NDArray
+
+
+class Work(NamedTuple):
+    """Of the base position: base (4, n + 1), differences of neighbours; angles (4, n + 1), cosine and sine of headings and of the
+    mean headings of links; strain (4, n + 1).
+
+    Of a position or a step, see `discs.steered`: links, along, tension (4, n + 1), across (2, n + 1), couple (n + 1,).
+    """
+
+    base: NDArray
+    angles: NDArray
+    strain: NDArray
+    links: NDArray
+    turned: NDArray
+    along: NDArray
+    tension: NDArray
+    across: NDArray
+    couple: NDArray
+    c: NDArray
+    step: NDArray
+    rhs: NDArray
+    matrix: Matrix
+
+
+S1, S2, S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
+S4, S5, S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
+C1, C2, C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
+C4, C5, C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+QUARTER = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21
+
+
+@part(inline="always")
+def turn(x):
+    """cos x and sin x to a unit in the last place for |x| < 1e6, without a branch or a call, so that loops run several at once.
+
+    Reduction by quarter turns in three parts and the minimax polynomials of fdlibm (Sun Microsystems, 1993).
+    """
+    quarters = math.floor(x * (2 / math.pi) + 0.5)
+    r = ((x - quarters * QUARTER[0]) - quarters * QUARTER[1]) - quarters * QUARTER[2]
+    z = r * r
+    sin = r + r * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
+    half = 0.5 * z
+    rest = 1.0 - half
+    cos = rest + (((1.0 - rest) - half) + z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
+    # one quarter turn takes (cos, sin) to (-sin, cos), two turn the signs
+    halves = math.floor(0.5 * quarters)
+    odd = quarters - 2.0 * halves
+    sign = 1.0 - 2.0 * (halves - 2.0 * math.floor(0.5 * halves))
+    first = -sin if odd > 0.5 else cos
+    second = cos if odd > 0.5 else sin
+    return sign * first, sign * second
+
+
+@fill(chain.workspace, Steered, _nrt=True)
+def _workspace(chain):
+    n = chain.radius.size
+    base, angles, strain = np.zeros((4, n + 1)), np.zeros((4, n + 1)), np.zeros((4, n + 1))
+    links, turned, along, tension = np.zeros((4, n + 1)), np.zeros((2, n + 1)), np.zeros((2, n + 1)), np.zeros((4, n + 1))
+    matrix = Matrix(np.empty((3, n)), np.empty((4, n)), np.empty((2, 2, n)), np.empty(11))
+    across, couple = np.zeros((2, n + 1)), np.zeros(n + 1)
+    c, step, rhs = np.empty((4, n)), np.empty((4, n)), np.empty((2, n))
+    return Work(base, angles, strain, links, turned, along, tension, across, couple, c, step, rhs, matrix)
+
+
+@fill(chain.factors, Steered, _nrt=True)
+def _factors(chain, g):
+    n, kind = chain.radius.size, np.array([g])
+    return Matrix(
+        np.empty((3, n), kind.dtype), np.empty((4, n), kind.dtype), np.empty((2, 2, n), kind.dtype), np.empty(11, kind.dtype)
+    )
+
+
+@part
+def strains(chain, d, cos, sin, strain):
+    """Stretch, shear, torsion and bending of links with differences d and mean headings of the given cosine and sine."""
+    per = 1 / chain.k
+    dx, dy, dt, dp = d[0], d[1], d[2], d[3]
+    stretch, shear, torsion, bend = strain[0], strain[1], strain[2], strain[3]
+    for j in range(dx.size):
+        stretch[j] = (cos[j] * dx[j] + sin[j] * dy[j]) * per - 1
+        shear[j] = (cos[j] * dy[j] - sin[j] * dx[j]) * per
+        torsion[j] = dt[j] * per
+        bend[j] = dp[j] * per
+
+
+@fill(chain.settle, Steered)
+def _settle(chain, work, hi, lo):
+    n = hi.shape[1]
+    for row in range(4):
+        x, e, to = hi[row], lo[row], work.base[row]
+        for j in range(1, n):
+            to[j] = (x[j] - x[j - 1]) + (e[j] - e[j - 1])
+        if chain.ring:
+            to[n] = (x[0] - x[n - 1]) + (e[0] - e[n - 1]) + chain.shift[row]
+            to[0] = to[n]
+    x, e = hi[3], lo[3]
+    cos, sin, mid_cos, mid_sin = work.angles[0], work.angles[1], work.angles[2], work.angles[3]
+    phi, middle = work.step[0], work.couple
+    for i in range(n):
+        phi[i] = x[i] + e[i]
+    for i in range(n):
+        cos[i], sin[i] = turn(phi[i])
+    for j in range(1, n):
+        middle[j] = 0.5 * (phi[j] + phi[j - 1])
+    middle[0] = middle[n] = 0.0
+    if chain.ring:
+        middle[n] = 0.5 * (phi[0] + chain.shift[3] + phi[n - 1])
+        middle[0] = middle[n]
+    for j in range(n + 1):
+        mid_cos[j], mid_sin[j] = turn(middle[j])
+    strains(chain, work.base, mid_cos, mid_sin, work.strain)
+
+
+@part
+def frame_of(chain, work, dphi, c):
+    """C after headings have turned by dphi."""
+    cos, sin = work.angles[0], work.angles[1]
+    cx, cy, ct, cp = c[0], c[1], c[2], c[3]
+    radius, roll, heading = chain.radius, chain.roots[0], chain.roots[1]
+    for i in range(dphi.size):
+        a, b = turn(dphi[i])
+        t = 1 / roll[i]
+        e = radius[i] * t
+        cx[i] = -e * (sin[i] * a + cos[i] * b)
+        cy[i] = e * (cos[i] * a - sin[i] * b)
+        ct[i] = t
+        cp[i] = 1 / heading[i]
+
+
+@part
+def differences(chain, y, d):
+    """Differences of neighbours of y (n,), (n + 1,)."""
+    n = y.size
+    for j in range(1, n):
+        d[j] = y[j] - y[j - 1]
+    if chain.ring:
+        d[n] = y[0] - y[n - 1]
+        d[0] = d[n]
+
+
+@part
+def means(chain, y, d):
+    """Means of neighbours of y (n,), (n + 1,)."""
+    n = y.size
+    for j in range(1, n):
+        d[j] = 0.5 * (y[j] + y[j - 1])
+    if chain.ring:
+        d[n] = 0.5 * (y[0] + y[n - 1])
+        d[0] = d[n]
+
+
+@fill(chain.frame, Steered)
+def _frame(chain, work, move, c):
+    frame_of(chain, work, move[3], c)
+
+
+@part
+def secant(chain, work, y, full):
+    """Mean geometry of a step whose half has moved the discs by y, or (not `full`) that of the position moved by y.
+
+    Left in `work`: along, the first row of the matrix that takes (dx, dy) to stretch and shear (the second is that turned by a
+    quarter), across, and the mean strain in `tension`. Short loops over few arrays each, as compilers can run several places
+    at once.
+    """
+    per = 1 / chain.k
+    means(chain, y[3], work.couple)
+    for row in range(4):
+        differences(chain, y[row], work.links[row])
+    half, cos, sin = work.couple, work.turned[0], work.turned[1]
+    for j in range(half.size):
+        cos[j], sin[j] = turn(half[j])
+    along_x, along_y, across_x, across_y = work.along[0], work.along[1], work.across[0], work.across[1]
+    cos0, sin0 = work.angles[2], work.angles[3]
+    for j in range(half.size):
+        along_x[j] = cos0[j] * cos[j] - sin0[j] * sin[j]
+    for j in range(half.size):
+        along_y[j] = sin0[j] * cos[j] + cos0[j] * sin[j]
+    bx, by, dx, dy = work.base[0], work.base[1], work.links[0], work.links[1]
+    stretch, shear = work.tension[0], work.tension[1]
+    if full:
+        e0, e1 = work.strain[0], work.strain[1]
+        for j in range(half.size):  # at the end of the step: a half turn further, two half steps on
+            c, s = along_x[j] * cos[j] - along_y[j] * sin[j], along_y[j] * cos[j] + along_x[j] * sin[j]
+            x, y2 = bx[j] + 2 * dx[j], by[j] + 2 * dy[j]
+            stretch[j] = 0.5 * (e0[j] + ((c * x + s * y2) * per - 1))
+            shear[j] = 0.5 * (e1[j] + (c * y2 - s * x) * per)
+    for j in range(half.size):
+        x, y1 = (bx[j] + dx[j]) * per, (by[j] + dy[j]) * per
+        across_x[j] = along_x[j] * y1 - along_y[j] * x
+        across_y[j] = -(along_x[j] * x + along_y[j] * y1)
+    if full:
+        for j in range(half.size):
+            h = half[j]
+            shorter = sin[j] / h if abs(h) > 1e-8 else 1.0
+            across_x[j] *= shorter
+            across_y[j] *= shorter
+        for j in range(half.size):
+            along_x[j] *= cos[j] * per
+            along_y[j] *= cos[j] * per
+    else:
+        for j in range(half.size):
+            stretch[j], shear[j] = -across_y[j] - 1, across_x[j]
+            along_x[j] *= per
+            along_y[j] *= per
+    for row in range(2, 4):
+        b, d, strain = work.base[row], work.links[row], work.tension[row]
+        for j in range(half.size):
+            strain[j] = (b[j] + d[j]) * per
+
+
+@part
+def tensions(chain, work):
+    """What links pull with, from their mean strain and geometry: tension (in place of the strain) and couple."""
+    per = 1 / chain.k
+    k0, k1 = chain.stiffness[0], chain.stiffness[1]
+    along_x, along_y, across_x, across_y = work.along[0], work.along[1], work.across[0], work.across[1]
+    s0, s1, couple = work.tension[0], work.tension[1], work.couple
+    for j in range(couple.size):
+        s0[j] *= k0[j]
+        s1[j] *= k1[j]
+    for j in range(couple.size):
+        couple[j] = 0.5 * (across_x[j] * s0[j] + across_y[j] * s1[j])
+    for j in range(couple.size):
+        n, q = s0[j], s1[j]
+        s0[j], s1[j] = along_x[j] * n - along_y[j] * q, along_y[j] * n + along_x[j] * q
+    for row in range(2, 4):
+        stiffness, s = chain.stiffness[row], work.tension[row]
+        for j in range(couple.size):
+            s[j] *= stiffness[j] * per
+
+
+@part
+def pulled(work, c, g):
+    """g = C^T grad V from the tensions."""
+    cx, cy, ct, cp = c[0], c[1], c[2], c[3]
+    x, y, t, p, couple = work.tension[0], work.tension[1], work.tension[2], work.tension[3], work.couple
+    roll, heading = g[0], g[1]
+    for i in range(roll.size):
+        roll[i] = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (t[i] - t[i + 1])
+    for i in range(roll.size):
+        heading[i] = cp[i] * ((p[i] - p[i + 1]) + (couple[i] + couple[i + 1]))
+
+
+@fill(chain.gradient, Steered)
+def _gradient(chain, work, move, g):
+    secant(chain, work, move, False)
+    tensions(chain, work)
+    for row in range(4):
+        x, to = work.tension[row], g[row]
+        for i in range(to.size):
+            to[i] = x[i] - x[i + 1]
+    couple, to = work.couple, g[3]
+    for i in range(to.size):
+        to[i] += couple[i] + couple[i + 1]
+
+
+@fill(chain.pullback, Steered)
+def _pullback(chain, work, move, c, g):
+    secant(chain, work, move, False)
+    tensions(chain, work)
+    pulled(work, c, g)
+
+
+@part
+def assemble(chain, work, c, one, g, d, o):
+    """Entries of `one` I + g C^T B^T (stiffness) B C for the mean geometry in `work`."""
+    n = c.shape[1]
+    per = 1 / chain.k
+    cx, cy, ct, cp = c[0], c[1], c[2], c[3]
+    along_x, along_y, across_x, across_y = work.along[0], work.along[1], work.across[0], work.across[1]
+    k0, k1, k2, k3 = chain.stiffness[0], chain.stiffness[1], chain.stiffness[2], chain.stiffness[3]
+    p, q, r = d[0], d[1], d[2]
+    for i in range(n):
+        p[i], q[i], r[i] = one, 0.0, one
+    o0, o1 = o[0], o[1]
+    for side in range(2):  # the links before discs and after them: along and across C, and torsion and bending of links
+        sign = 1.0 - 2.0 * side
+        ax, ay, bx, by = along_x[side:], along_y[side:], across_x[side:], across_y[side:]
+        s0, s1, s2, s3 = k0[side:], k1[side:], k2[side:], k3[side:]
+        for i in range(n):
+            normal, shear = ax[i] * cx[i] + ay[i] * cy[i], ax[i] * cy[i] - ay[i] * cx[i]
+            o0[i], o1[i] = normal, shear
+        for i in range(n):
+            t = ct[i] * per
+            p[i] += g * (s0[i] * o0[i] * o0[i] + s1[i] * o1[i] * o1[i] + s2[i] * t * t)
+        for i in range(n):
+            q[i] += sign * g * 0.5 * cp[i] * (s0[i] * o0[i] * bx[i] + s1[i] * o1[i] * by[i])
+        for i in range(n):
+            b = cp[i] * per
+            r[i] += g * (0.25 * cp[i] * cp[i] * (s0[i] * bx[i] * bx[i] + s1[i] * by[i] * by[i]) + s3[i] * b * b)
+    # o0, o1 hold what the links after discs make of these discs; the same links make n1, q1 of the next ones
+    for i in range(n - 1):
+        couple(i, i + 1, c, g, per, chain.stiffness, work.along, work.across, o)
+    if chain.ring:
+        couple(n - 1, 0, c, g, per, chain.stiffness, work.along, work.across, o)
+    else:
+        for row in range(4):
+            o[row, n - 1] = 0.0
+
+
+@part
+def couple(i, j, c, g, per, stiffness, along, across, o):
+    """The block of disc i and the next, j, from the link i + 1 between them; o[:2, i] are its stretch and shear by disc i's
+    roll."""
+    link = i + 1
+    n0, q0 = -o[0, i], -o[1, i]
+    n1, q1 = along[0, link] * c[0, j] + along[1, link] * c[1, j], along[0, link] * c[1, j] - along[1, link] * c[0, j]
+    h0, h1 = 0.5 * c[3, i], 0.5 * c[3, j]
+    n, q = g * stiffness[0, link], g * stiffness[1, link]
+    x, y = across[0, link], across[1, link]
+    o[0, i] = n * n0 * n1 + q * q0 * q1 - g * stiffness[2, link] * (c[2, i] * per) * (c[2, j] * per)
+    o[1, i] = h1 * (n * n0 * x + q * q0 * y)
+    o[2, i] = h0 * (n * n1 * x + q * q1 * y)
+    o[3, i] = h0 * h1 * (n * x * x + q * y * y) - g * stiffness[3, link] * (c[3, i] * per) * (c[3, j] * per)
+
+
+@part
+def border(m):
+    """Factor a ring's matrix: the chain without its last disc, and what that adds."""
+    last = m.d.shape[1] - 1
+    e, first, second = m.edge, m.columns[0, :, :last], m.columns[1, :, :last]
+    for i in range(4):
+        e[i] = m.o[i, last]  # last disc (rows) with disc 0
+        e[4 + i] = m.o[i, last - 1]  # disc last - 1 (rows) with the last
+    blocks.factor(m.d[:, :last], m.o[:, :last])
+    first[:], second[:] = 0, 0
+    first[0, 0] += e[0]
+    first[1, 0] += e[1]
+    second[0, 0] += e[2]
+    second[1, 0] += e[3]
+    first[0, last - 1] += e[4]
+    first[1, last - 1] += e[6]
+    second[0, last - 1] += e[5]
+    second[1, last - 1] += e[7]
+    blocks.substitute(m.d[:, :last], m.o[:, :last], first)
+    blocks.substitute(m.d[:, :last], m.o[:, :last], second)
+    x = m.d[0, last] - across_border(e, 0, first)
+    y = m.d[1, last] - across_border(e, 0, second)
+    z = m.d[2, last] - across_border(e, 1, second)
+    det = reciprocal(x * z - y * y)
+    e[8], e[9], e[10] = z * det, -y * det, x * det
+
+
+@part
+def across_border(e, row, b):
+    """Row of the last disc's coupling to the others, times b (2, n - 1)."""
+    end = b.shape[1] - 1
+    return e[2 * row] * b[0, 0] + e[2 * row + 1] * b[1, 0] + e[4 + row] * b[0, end] + e[6 + row] * b[1, end]
+
+
+@part
+def factor(chain, m):
+    if chain.ring:
+        border(m)
+    else:
+        blocks.factor(m.d, m.o)
+
+
+@part
+def solve(chain, m, b):
+    if not chain.ring:
+        blocks.substitute(m.d, m.o, b)
+        return
+    last, e = b.shape[1] - 1, m.edge
+    inner = b[:, :last]
+    blocks.substitute(m.d[:, :last], m.o[:, :last], inner)
+    x, y = b[0, last] - across_border(e, 0, inner), b[1, last] - across_border(e, 1, inner)
+    x, y = e[8] * x + e[9] * y, e[9] * x + e[10] * y
+    for row in range(2):
+        for i in range(last):
+            b[row, i] -= m.columns[0, row, i] * x + m.columns[1, row, i] * y
+    b[0, last], b[1, last] = x, y
+
+
+@fill(chain.sweep, Steered)
+def _sweep(chain, work, h, pi, p, move):
+    n = p.shape[1]
+    half = 0.5 * h
+    c, b, m = work.c, work.rhs, work.matrix
+    frame_of(chain, work, move[3], c)
+    forward(c, p, work.step)
+    for row in range(4):
+        for i in range(n):
+            work.step[row, i] *= half
+    secant(chain, work, work.step, True)
+    tensions(chain, work)
+    pulled(work, c, b)
+    for row in range(2):
+        for i in range(n):
+            b[row, i] = pi[row, i] - p[row, i] - half * b[row, i]
+    assemble(chain, work, c, 1.0, half * half, m.d, m.o)
+    factor(chain, m)
+    solve(chain, m, b)
+    for row in range(2):
+        for i in range(n):
+            p[row, i] += b[row, i]
+    return renew(c, p, half, move, chain.scale, b[0])
+
+
+@fill(chain.stiffness, Steered)
+def _stiffness(chain, work, move, c, matrix):
+    secant(chain, work, move, False)
+    assemble(chain, work, c, 0.0, 1.0, matrix.d, matrix.o)
+
+
+@fill(chain.precondition, Steered)
+def _precondition(chain, stiff, g, matrix):
+    n = stiff.d.shape[1]
+    for i in range(n):
+        matrix.d[0, i], matrix.d[1, i], matrix.d[2, i] = 1 + g * stiff.d[0, i], g * stiff.d[1, i], 1 + g * stiff.d[2, i]
+    for row in range(4):
+        for i in range(n):
+            matrix.o[row, i] = g * stiff.o[row, i]
+    factor(chain, matrix)
+
+
+@fill(chain.correct, Steered)
+def _correct(chain, matrix, r):
+    solve(chain, matrix, r)
+
+
+@fill(chain.potential, Steered)
+def _potential(chain, work):
+    total = 0.0
+    for row in range(4):
+        for j in range(1, work.strain.shape[1]):
+            total += chain.stiffness[row, j] * work.strain[row, j] ** 2
+    return 0.5 * total
+
+
+@fill(chain.lost, Steered)
+def _lost(chain, work, slope):
+    return -1

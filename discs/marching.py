@@ -1,0 +1,178 @@
+"""Steps without end: what carries a run from frame to frame, plain or compiled, and stops it when it has gone wrong."""
+
+import sys
+import threading
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from discs.chain import Chain
+from discs.integrators import Integrator, Work
+from discs.integrators.base import Frame
+from discs.problem import Problem
+from discs.system import Phase
+
+_PREPARED: set[tuple[type, type]] = set()
+CHUNK = 4_000_000  # discs times steps of a compiled call: some tenths of a second, then progress is shown and Ctrl-C heard
+
+
+class SimulationError(RuntimeError):
+    """A run that could not go on.
+
+    Attributes
+    ----------
+    step, time, disc : where it stopped.
+    """
+
+    def __init__(self, message: str, step: int, time: float, disc: int) -> None:
+        super().__init__(f"{message} (step {step}, time {time:g}, disc {disc})")
+        self.message, self.step, self.time, self.disc = message, step, time, disc
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.message, self.step, self.time, self.disc)
+
+
+def _warn_of_lost_digits(problem: Problem, h: float) -> None:
+    """Warn where solves with I + h^2/4 C^T S C, whose entries reach 4 h^2 K R^2/(M k^4), lose the digits that sweeps would win
+    back.
+
+    A sweep multiplies what is still wrong by that times the unit of rounding, 1.1e-16: they stop converging when it comes near one.
+    """
+    chain = problem.chain
+    if not isinstance(chain, Chain):
+        return
+    radius = np.asarray(chain.radius)
+    per_stiffness = np.max(radius**2 / (np.asarray(chain.spin_inertia) + np.asarray(chain.density) * radius**2))
+    lost = 1.1e-16 * 4 * h**2 * np.max(chain.bending_stiffness) * per_stiffness / chain.k**4
+    if lost > 0.1:
+        warnings.warn(
+            f"{chain.n} discs at dt = {h:g}: each sweep of a step keeps {lost:.1g} of what is wrong, by rounding, and the run "
+            f"may not be trusted; take dt below {h * np.sqrt(0.1 / lost):.1g}, or fewer discs",
+            stacklevel=4,
+        )
+
+
+class March:
+    """A run on its way.
+
+    Parameters
+    ----------
+    problem, integrator, h : what runs, how, and in which steps.
+    compiled : use the chain's compiled form.
+    quiet : do not say that kernels are being compiled.
+
+    Attributes
+    ----------
+    step : steps taken.
+    work : what they cost.
+    memory : what the integrator remembers.
+    """
+
+    def __init__(self, problem: Problem, integrator: Integrator, h: float, compiled: bool, quiet: bool) -> None:
+        self.problem, self.integrator, self.h = problem, integrator, h
+        self.system, self.work, self.step = problem.system, Work(), 0
+        self.kernel = self.system.kernel if compiled else None
+        self.compiled = self.kernel is not None and not integrator.adaptive
+        self.chunk = max(1, CHUNK // self.system.n)
+        # V >= 0 and H is constant, so the kinetic energy cannot exceed H; far below one unit of twist is rounding
+        chain = problem.chain
+        rounding = 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
+        self.bound = 10 * problem.energy() + rounding
+        if integrator.stability_limit == np.inf and not integrator.adaptive:
+            _warn_of_lost_digits(problem, h)
+        self.memory: Any = integrator.begin(self.system, problem.start(), h, self.work, self.kernel)
+        if self.kernel is not None:
+            self._prepare(quiet)
+
+    def _prepare(self, quiet: bool) -> None:
+        """Have the kernels compiled: once for all runs on a machine, read from disc once in a process."""
+        key = type(self.integrator), type(self.kernel)
+        if key in _PREPARED:
+            return
+        word = f"compiling {self.integrator.name!r}, once on this machine: some tens of seconds ..."
+        notice = threading.Timer(2.0, print, (word,), {"file": sys.stderr, "flush": True})
+        notice.daemon = True
+        if not quiet:
+            notice.start()
+        try:
+            if self.compiled:
+                self.integrator.march(self.kernel, self.memory, self.h, 0, self.bound)
+            self.observe(self.frame(0.0))
+        finally:
+            notice.cancel()
+        _PREPARED.add(key)
+
+    def to(self, step: int) -> Iterator[int]:
+        """Go on to a step; yields how many steps were taken at a time."""
+        while self.step < step:
+            taken = self._compiled(min(self.chunk, step - self.step)) if self.compiled else self._plain()
+            self.step += taken
+            yield taken
+
+    def frame(self, tau: float) -> Frame:
+        """The discs a time 0 <= tau < h after the last step."""
+        frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)
+        if tau:
+            time = self.step * self.h + tau
+            moved = Phase(frame.hi, frame.lo, frame.rate)
+            self._check_heading(self.system.lost_heading(self.memory, moved), self.step, time)
+            self._check_energy(self.system.kinetic(frame.rate), frame, self.step, time)
+        return frame
+
+    def observe(self, frame: Frame) -> dict[str, Any]:
+        """What every frame records, by the names that `Solution` has for it."""
+        system = self.system
+        if self.kernel is not None:
+            from discs.kernels import methods
+
+            q = np.empty_like(frame.hi)
+            energy, slip = methods.observe(self.kernel, frame.hi, frame.lo, frame.rate, q)
+        else:
+            shape = system.shape(frame.hi, frame.lo)
+            q, energy = frame.hi + frame.lo, system.kinetic(frame.rate) + system.potential(shape)
+            slip = np.hypot(*(frame.rate[:2] - system.contact(shape) * frame.rate[2])).max()
+        return dict(zip(system.rows, q, strict=True)) | {"omega": frame.rate[2], "energy": energy, "rolling_residual": slip}
+
+    def _plain(self) -> int:
+        integrator, system, h = self.integrator, self.system, self.h
+        previous, self.memory = self.memory, integrator.advance(system, self.memory, h, self.work)
+        self._check(system.lost_heading(previous, self.memory), self.step + 1)
+        return 1
+
+    def _compiled(self, steps: int) -> int:
+        self.memory, tally = self.integrator.march(self.kernel, self.memory, self.h, steps, self.bound)
+        self.work.add(tally)
+        self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps)
+        return tally.steps
+
+    def _check(self, lost: int | None, step: int) -> None:
+        self._check_heading(lost, step, step * self.h)
+        self._check_energy(self.integrator.kinetic(self.system, self.memory, self.h), None, step, step * self.h)
+
+    def _check_heading(self, lost: int | None, step: int, time: float) -> None:
+        if lost is not None:
+            raise SimulationError(
+                "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
+                "end the run earlier, or take a smaller dt if the motion is not resolved",
+                step,
+                time,
+                lost,
+            )
+
+    def _check_energy(self, kinetic: float, frame: Frame | None, step: int, time: float) -> None:
+        if kinetic <= self.bound:
+            return
+        frame = frame or self.integrator.at(self.system, self.memory, 0.0, self.h, self.work, None)
+        speed = np.abs(frame.rate[2])
+        disc = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
+        if np.isfinite(self.integrator.stability_limit):
+            name = self.integrator.name
+            cause = f"dt = {self.h:g} is above the stability limit of {name!r}: take a smaller dt or 'midpoint'"
+        elif self.work.unconverged:
+            cause = f"dt = {self.h:g} is too large for the iteration to converge: take a smaller dt or 'midpoint'"
+        else:
+            cause = "the step has lost all digits: take a smaller dt, fewer discs or softer springs"
+        what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
+        raise SimulationError(f"the run blew up, {what}; likely {cause}", step, time, disc)

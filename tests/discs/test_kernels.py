@@ -1,0 +1,171 @@
+"""The compiled forms against their plain twins, and the linear algebra in them against NumPy."""
+
+import math
+import subprocess
+import sys
+
+import numba
+import numpy as np
+import pytest
+
+from discs import Chain, Midpoint, Problem, State, simulate
+from discs.integrators import METHODS
+from discs.integrators.composition import Composition
+from discs.integrators.ivp import Reduced
+from discs.kernels import banded, blocks, steered
+from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
+
+COMPILED = SLAVED + STEERED
+SIZES = [2, 3, 4, 5, 6, 7, 8, 9, 12, 31]
+# rounding differs in the order of sums: a few units in the last place, times what an unconverged sweep of a stiff step leaves
+CLOSE = 3e-12
+
+
+def settings(name: str):
+    """The method converged, and after one sweep, where the matrix it solves with matters."""
+    cls = METHODS[name]
+    if not hasattr(cls(), "sweeps") and not issubclass(cls, Composition):
+        return [cls()]
+    once = Midpoint(sweeps=1, tolerance=0) if issubclass(cls, Composition) else None
+    return [cls(), cls(once) if once else cls(sweeps=1, tolerance=0)]
+
+
+@models(COMPILED)
+@pytest.mark.parametrize("name", [name for name, cls in METHODS.items() if not cls.adaptive])
+def test_twins_agree(name, model):
+    least = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}[model.ends] - (
+        model.law == "steered" and model.ends == "springs"
+    )
+    for n in (n for n in SIZES if n >= least):
+        problem = uneven(n, model)
+        dt = 0.05 if METHODS[name].stability_limit == np.inf else 0.3 / n**2
+        times = dt * np.array([0.0, 2.0, 3.5])
+        for method in settings(name):
+            a, b = (simulate(problem, method, dt, times, ("velocity",), False, engine) for engine in ("compiled", "plain"))
+            for row in (*problem.system.rows, "omega", "x_rate", "energy"):
+                np.testing.assert_allclose(getattr(a, row), getattr(b, row), atol=CLOSE, err_msg=f"n = {n}, {method}")
+            for count in ("steps", "gradients", "solves", "unconverged"):
+                assert abs(a.stats[count] - b.stats[count]) <= 0.1 * b.stats[count], (n, method, count)
+            assert (a.stats["engine"], b.stats["engine"]) == ("compiled", "plain")
+
+
+@models(COMPILED)
+def test_reduced_equations_agree_and_stay_within_their_sparsity(model):
+    problem = uneven(9, model)
+    plain, compiled = Reduced(problem.system), Reduced(problem.system, problem.system.kernel)
+    z = problem.start()
+    y = plain.join(z.hi, z.pi)
+    np.testing.assert_array_equal(plain.split(y).hi, z.hi)
+    np.testing.assert_allclose(compiled(0.0, y), plain(0.0, y), atol=1e-11 * np.abs(plain(0.0, y)).max())
+    eps = 1e-6
+    jacobian = np.array([(plain(0.0, y + eps * e) - plain(0.0, y - eps * e)) / (2 * eps) for e in np.eye(y.size)]).T
+    found, pattern = np.abs(jacobian) > 1e-4, plain.sparsity().toarray() > 0
+    assert not (found & ~pattern).any()
+    row, column = found.nonzero()
+    if model.ends != "ring":
+        assert np.abs(row - column).max() <= plain.width
+    narrower = np.abs(np.subtract.outer(np.arange(9), np.arange(9))) < problem.system.reach
+    width = y.size // 9
+    assert model.ends == "ring" or (found & ~np.kron(narrower, np.ones((width, width), bool))).any()  # the reach is needed
+
+
+def dense_banded(a, u, w, corner):
+    n = a.size
+    matrix = np.diag(a)
+    for i in range(n):
+        for j, value in ((i + 1, u[i]), (i + 2, w[i])):
+            if j < n:
+                matrix[i, j] = matrix[j, i] = value
+    if n >= 4:
+        matrix[0, 3] += corner[0]
+        matrix[3, 0] += corner[0]
+        matrix[n - 4, n - 1] += corner[1]
+        matrix[n - 1, n - 4] += corner[1]
+    return matrix
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+def test_pentadiagonal_elimination(kind):
+    @numba.njit
+    def solve(a, u, w, corner, b):
+        banded.factor(a, u, w, corner)
+        banded.substitute(a, u, w, corner, b)
+
+    rng = np.random.default_rng(2)
+
+    def some(n):
+        return (rng.standard_normal(n) + (1j * rng.standard_normal(n) if kind is complex else 0)).astype(kind)
+
+    for n in [*range(1, 20), 101]:
+        a, u, w, corner, b = some(n) + 12, some(n), some(n), some(2), some(n)
+        corner[1] *= n > 4
+        corner[0] *= n > 3
+        expected = np.linalg.solve(dense_banded(a, u, w, corner), b)
+        solve(a, u, w, corner, b)
+        np.testing.assert_allclose(b, expected, atol=1e-14, err_msg=f"n = {n}")
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+def test_block_tridiagonal_elimination(kind):
+    @numba.njit
+    def solve(d, o, b):
+        blocks.factor(d, o)
+        blocks.substitute(d, o, b)
+
+    rng = np.random.default_rng(3)
+
+    def some(*shape):
+        return (rng.standard_normal(shape) + (1j * rng.standard_normal(shape) if kind is complex else 0)).astype(kind)
+
+    for n in [*range(1, 14), 50]:
+        d, o, b = some(3, n) + np.array([[9], [0], [9]]), some(4, n), some(2, n)
+        matrix = np.zeros((2 * n, 2 * n), kind)
+        for i in range(n):
+            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[d[0, i], d[1, i]], [d[1, i], d[2, i]]]
+            if i + 1 < n:
+                matrix[2 * i : 2 * i + 2, 2 * i + 2 : 2 * i + 4] = o[:, i].reshape(2, 2)
+                matrix[2 * i + 2 : 2 * i + 4, 2 * i : 2 * i + 2] = o[:, i].reshape(2, 2).T
+        expected = np.linalg.solve(matrix, b.T.ravel()).reshape(n, 2).T
+        solve(d, o, b)
+        np.testing.assert_allclose(b, expected, atol=1e-14, err_msg=f"n = {n}")
+
+
+def test_sines_and_cosines():
+    @numba.njit
+    def all_of(x, cos, sin):
+        for i in range(x.size):
+            cos[i], sin[i] = steered.turn(x[i])
+
+    x = np.concatenate([np.linspace(-20, 20, 4001), np.array([0.0, 1e-300, 1e5, -1e6]), np.pi / 4 * np.arange(-40, 41)])
+    cos, sin = np.empty_like(x), np.empty_like(x)
+    all_of(x, cos, sin)
+    np.testing.assert_allclose(cos, [math.cos(v) for v in x], rtol=0, atol=1.2e-16)
+    np.testing.assert_allclose(sin, [math.sin(v) for v in x], rtol=0, atol=1.2e-16)
+
+
+def test_true_curvature_has_the_plain_form_only():
+    run = simulate(uneven(7, ALL[-3]), dt=0.1, progress=False)
+    assert run.stats["engine"] == "plain"
+
+
+def test_runs_do_not_touch_the_problem():
+    problem = uneven(9, Model("springs", "field"))
+    before = [array.copy() for array in problem.start()]
+    simulate(problem, "leapfrog", 0.001, progress=False)
+    simulate(problem, "gauss6", 0.1, progress=False)
+    for now, then in zip(problem.start(), before, strict=True):
+        np.testing.assert_array_equal(now, then)
+
+
+def test_more_discs_than_doubles_can_hold_are_warned_of():
+    n = 20_001
+    chain = Chain(n=n, length=0.2, density=1.0, spin_inertia=1.0, torsion_stiffness=1.0, bending_stiffness=1.0, radius=1.0)
+    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 0.1)
+    with pytest.warns(UserWarning, match=r"20001 discs at dt = 0.05: each sweep .* take dt below"):
+        simulate(problem, dt=0.05, frames=1, progress=False)
+
+
+def test_importing_does_not_compile():
+    """numba is slow to import: it is taken only when something runs."""
+    code = "import sys, discs; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
