@@ -2,6 +2,7 @@
 
 from compare.lump import lump
 from compare.main_job import overview
+from compare.precision import WorkPrecision, work_precision
 from compare.study import Study, convergence
 
-__all__ = ["Study", "convergence", "lump", "overview"]
+__all__ = ["Study", "WorkPrecision", "convergence", "lump", "overview", "work_precision"]

@@ -19,7 +19,7 @@ from compare.lump import lump
 from compare.peers import reduced
 from compare.peers.reduced import Cutoff, Outcome, Peer
 from continuum import Scene
-from discs import Gauss6, Gauss8, Integrator, Midpoint, Problem, SimulationError, Suzuki4, checks, simulate
+from discs import Chain, Gauss6, Gauss8, Integrator, Midpoint, Problem, SimulationError, Suzuki4, checks, simulate
 
 SIZES = (32, 128, 512, 2048)
 WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
@@ -176,14 +176,24 @@ def _outcome(problem: Problem, run: Callable) -> Outcome:
 
 
 def peers(problem: Problem) -> list[Peer]:
-    """The peers that are installed."""
+    """The peers that are installed and can express the problem, at sizes they can bear."""
     f = reduced.Bound(problem)
+    n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
     found = reduced.scipy_peers(problem, f)
     if find_spec("sksundae"):
         found += [*reduced.sundials_peers(problem, f), reduced.multiplier_peer(problem)]
     if find_spec("diffrax") and problem.chain.ends == "springs":
         found += reduced.diffrax_peers(problem)
-    if problem.chain.n <= 128:
+    if find_spec("exudyn"):
+        from compare.peers.exudyn_chain import exudyn_steered_peer
+        from compare.peers.exudyn_field import exudyn_field_peer
+
+        found.append(exudyn_field_peer(problem) if slaved else exudyn_steered_peer(problem))
+    if find_spec("mujoco") and n <= 512 and not (isinstance(problem.chain, Chain) and problem.chain.rolling == "field"):
+        from compare.peers.mujoco_discs import mujoco_peer
+
+        found += [mujoco_peer(problem), mujoco_peer(problem, second_order=False)]
+    if n <= 128:
         found.append(reduced.saddle_peer(problem))
     return found
 

@@ -19,6 +19,7 @@ import exudyn as exu
 import numpy as np
 from exudyn import itemInterface as items
 
+from compare.peers.reduced import Outcome, Peer
 from discs import Problem, Solution, State, SteeredChain
 
 UP, X, Y, HEADING, LEAN, ROLL = range(6)
@@ -98,6 +99,18 @@ def exudyn_steered(problem: Problem, dt: float, frames: int = 2, spectral_radius
         y_rate=rate[Y],
         phi_rate=rate[HEADING],
     )
+
+
+def exudyn_steered_peer(problem: Problem) -> Peer:
+    """The chain as a peer in speed against error: `exudyn_steered` with more and more steps."""
+
+    def run(setting: float, seconds: float) -> Outcome:
+        found = exudyn_steered(problem, problem.duration / setting)
+        q = np.array([getattr(found, row)[-1] for row in problem.system.rows])
+        return Outcome(q, int(found.stats["steps"]), 0, found.stats.get("newton_iterations"), found.stats["seconds"])
+
+    differs = "rigid wheels on its rolling joint, its own beam between them; 9 coordinates and 7 multipliers a disc"
+    return Peer("Exudyn, wheels and beams", (45.0, 90.0, 180.0, 360.0), run, differs)
 
 
 def _build(mbs: exu.MainSystem, chain: SteeredChain, initial: State) -> list[tuple[Any, Any]]:

@@ -1,0 +1,98 @@
+"""Speed against error: every peer solves the same problem, failures stay in the table, and the arithmetic of the comparison."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from compare import lump, work_precision
+from compare.__main__ import main
+from compare.peers import reduced
+from compare.peers.reduced import Cutoff, Outcome, Peer
+from compare.precision import Row, WorkPrecision, ours, peers, reference
+from continuum import untwisting_rod
+from discs import Problem
+from tests.conftest import Model, uneven
+
+# a short motion: peers whose error is that of their tolerances come close
+SHORT = {
+    "unit": lump(untwisting_rod(rolling="unit", duration=0.4), 9),
+    "uneven": uneven(7, Model("springs", "field")),
+    "uneven own": uneven(7, Model("springs", "steered")),
+}
+# what their methods allow in this motion; friction creeps
+BOUND = {"IDA, multipliers": 1e-3, "Exudyn, generic": 3e-4, "Exudyn, wheels and beams": 3e-4, "MuJoCo, friction, damped": 3e-2}
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_peers_solve_the_same_problem(name):
+    problem: Problem = SHORT[name]
+    exact, floor = reference(problem)
+    assert floor < 1e-11
+    found = peers(problem)
+    names = {peer.name for peer in found}
+    exudyn = "Exudyn, wheels and beams" if "own" in name else "Exudyn, generic"
+    for module, peer in (("scipy", "SciPy Radau"), ("sksundae", "CVODE BDF-2"), ("diffrax", "diffrax Tsit5"), ("exudyn", exudyn)):
+        assert (find_spec(module) is not None) == (peer in names)
+    for peer in [*found, *ours(problem)]:
+        setting = peer.settings[3 if peer in found else -1]
+        q = peer.run(setting, 60.0).q
+        error = (np.abs(q - exact).max(axis=1) / np.abs(exact).max(axis=1)).max()
+        assert error < BOUND.get(peer.name, 1e-4), (peer.name, setting, error)
+
+
+def test_failures_stay_in_the_table():
+    def wrong(setting: float, seconds: float) -> Outcome:
+        return Outcome(np.ones((3, 9)), 3, 4, None, 1e-3)
+
+    def slow(setting: float, seconds: float) -> Outcome:
+        raise Cutoff
+
+    def broken(setting: float, seconds: float) -> Outcome:
+        raise ArithmeticError("the step became too small")
+
+    def methods(problem: Problem) -> list[Peer]:
+        return [Peer(run.__name__, (1e-3, 1e-4), run, "differs") for run in (wrong, slow, broken)]
+
+    study = work_precision({"short": untwisting_rod(duration=0.2)}, (9,), methods, repeats=2, seconds=5.0, progress=False)
+    rows = {(r.method, r.setting): r for r in study.rows}
+    assert rows["wrong", 1e-3].remark == "says it succeeded, and is wrong"
+    assert rows["wrong", 1e-3].seconds == 1e-3
+    assert "cut off after 5 s" in rows["slow", 1e-3].remark
+    assert ("slow", 1e-4) not in rows
+    assert "failed: the step became too small" in rows["broken", 1e-4].remark
+    assert np.isnan(rows["broken", 1e-4].error)
+    assert any(r.ours and r.method == "auto" and r.error < 1e-6 for r in study.rows)
+    assert "says it succeeded, and is wrong" in study.report()
+    assert "* slow: differs." in study.report()
+
+
+def test_times_at_equal_error():
+    def row(method: str, mine: bool, error: float, seconds: float) -> Row:
+        return Row("p", 8, method, mine, 0.0, error, seconds, None, None, None, "")
+
+    rows = [row("a", True, 1e-2, 1.0), row("a", True, 1e-4, 2.0), row("a", True, 1e-3, 50.0), row("b", False, 1e-2, 8.0)]
+    rows += [row("b", False, 1e-6, 32.0), row("c", False, np.nan, 0.1), row("c", False, 2.0, 0.1)]
+    study = WorkPrecision(rows, {("p", 8): 1e-12}, {})
+    assert study.time_at(1e-3, "p", 8, True)[0] == pytest.approx(2**0.5)  # halfway in the logarithm; the slow run does not count
+    assert study.time_at(1e-4, "p", 8, False) == (pytest.approx(16.0), "b")
+    assert study.time_at(1e-5, "p", 8, True)[0] == np.inf
+    assert "| p | 8 | 1e-04 | a | 2e+03 ms | b | 1.6e+04 ms | 8 |" in study.speedups()
+
+
+def test_a_run_over_its_time_is_cut_off():
+    problem = lump(untwisting_rod(), 65)
+    f = reduced.Bound(problem)
+    with pytest.raises(Cutoff):
+        reduced.scipy_peers(problem, f)[0].run(1e-6, 0.01)
+
+
+def test_command_line(tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = ["precision", "--n", "9", "--laws", "field", "--repeats", "1", "--seconds", "0.5", "--quiet", "--out", str(out)]
+    assert main(arguments) == 0
+    assert sorted(p.name for p in out.iterdir()) == ["precision.csv", "precision.md", "precision.png"]
+    assert "fastest peer" in capsys.readouterr().out
+    assert (out / "precision.csv").read_text().startswith("problem,n,method,ours,setting,error,seconds")
+    assert main(["precision", "--n", "9", "--repeats", "0", "--quiet", "--out", str(out)]) == 2
+    assert "repeats must be a whole number" in capsys.readouterr().err

@@ -1,0 +1,52 @@
+"""Runs to a tolerance: the true error is within it, and both choices are told."""
+
+import numpy as np
+import pytest
+
+from compare import lump
+from continuum import breathing_ring, steered_rod, untwisting_rod
+from discs import Gauss6, Gauss8, SimulationError, simulate
+from tests.conftest import Model, models, uneven
+
+
+def true_error(problem, run):
+    exact = simulate(problem, Gauss8(tolerance=1e-14), problem.duration / 500, run.t, progress=False)
+    rows = [(getattr(run, row), getattr(exact, row)) for row in problem.system.rows]
+    return max(np.abs(a - b).max() / np.abs(b).max() for a, b in rows)
+
+
+@pytest.mark.parametrize("tol", [3e-3, 1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize(
+    "problem",
+    [
+        lump(untwisting_rod(), 65),
+        lump(untwisting_rod(rolling="unit"), 200, "consistent"),
+        lump(steered_rod(), 33),
+        lump(breathing_ring(duration=2.0), 40),
+    ],
+    ids=["field", "unit", "steered", "ring"],
+)
+def test_the_true_error_is_within_the_tolerance(problem, tol):
+    run = simulate(problem, "auto", tol=tol, frames=12, progress=False)
+    assert true_error(problem, run) <= tol
+    assert run.stats["method"] == ("midpoint" if tol >= 3e-4 else "gauss6")
+    assert run.stats["attempts"] >= 2
+    assert run.stats["dt"] > 0
+    assert set(run.error_estimate) == set(problem.system.rows)
+    assert run.t.size == 12
+
+
+@models([Model("springs", "true"), Model("ring", "field")])
+@pytest.mark.parametrize("method", ["midpoint", "suzuki4", "gauss4", Gauss6(tolerance=1e-11)])
+def test_a_method_of_one_s_own_choice(method, model):
+    problem = uneven(7, model)
+    run = simulate(problem, method, tol=1e-4, frames=3, progress=False)
+    assert true_error(problem, run) <= 1e-4
+    assert run.stats["method"] == getattr(method, "name", method)
+
+
+def test_what_cannot_be_reached_is_said():
+    with pytest.raises(SimulationError, match=r"tol = 1e-25 was not reached: the error is estimated at .* with dt ="):
+        simulate(uneven(5, Model("springs", "field")), "gauss6", tol=1e-25, frames=1, progress=False)
+    with pytest.raises(SimulationError, match="lost its heading"):
+        simulate(lump(breathing_ring("unit", duration=4.0, omega=0.4), 24), "auto", frames=1, progress=False)
