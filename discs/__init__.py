@@ -4,8 +4,9 @@ from discs.chain import Chain, SteeredChain
 from discs.integrators import RK4, Gauss4, Gauss6, Gauss8, Integrator, KahanLi6, Leapfrog, McLachlanPerlmutter, Midpoint, Suzuki4
 from discs.marching import SimulationError
 from discs.problem import Problem, State
-from discs.simulation import simulate, suggest_dt
+from discs.simulation import simulate
 from discs.solution import Solution
+from discs.step import suggest_dt
 
 __all__ = [
     "RK4",

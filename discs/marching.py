@@ -14,6 +14,7 @@ from discs.integrators.base import Frame
 from discs.problem import Problem
 from discs.system import Phase
 
+NOTICE = 2.0  # seconds of compiling after which it is said
 _PREPARED: set[tuple[type, type]] = set()
 CHUNK = 4_000_000  # discs times steps of a compiled call: some tenths of a second, then progress is shown and Ctrl-C heard
 
@@ -92,7 +93,7 @@ class March:
         if key in _PREPARED:
             return
         word = f"compiling {self.integrator.name!r}, once on this machine: some tens of seconds ..."
-        notice = threading.Timer(2.0, print, (word,), {"file": sys.stderr, "flush": True})
+        notice = threading.Timer(NOTICE, print, (word,), {"file": sys.stderr, "flush": True})
         notice.daemon = True
         if not quiet:
             notice.start()

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse.linalg import LinearOperator, eigsh
 from tqdm import tqdm
 
 from discs import checks
@@ -15,6 +14,7 @@ from discs.integrators.base import Frame
 from discs.marching import March
 from discs.problem import Problem
 from discs.solution import Solution
+from discs.step import suggest_dt
 from discs.system import SkewGradient
 from discs.tolerance import to_tolerance
 
@@ -69,8 +69,7 @@ def simulate(
             return simulate(problem, integrator, dt, times, want, progress, engine)
 
         times = frame_times(frames, problem.duration)
-        first = suggest_dt(problem, "midpoint" if method == "auto" else method)
-        return to_tolerance(problem, method, 1e-3 if tol is None else tol, times, max(first, problem.duration / 20), run)
+        return to_tolerance(problem, method, 1e-3 if tol is None else tol, times, run)
     integrator = find(method)
     want = _wanted(want, integrator)
     compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None
@@ -148,48 +147,6 @@ class Progress:
             self._bar.update(steps)
         elif self._shown and clock.perf_counter() - self._started > 1:
             self._bar = tqdm(total=self._total, initial=self._done, desc=self._name, unit="step")
-
-
-def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float:
-    """A step for a method: accurate to about 1e-3 for smooth motion if implicit, 0.7 of the stability limit if explicit.
-
-    Implicit: half the time a torsion wave takes from disc to disc, at most a hundredth of the duration.
-    SciPy's methods: a tenth of the duration, the longest step they may take.
-    Explicit: the limit is the method's over Omega, Omega^2 the largest eigenvalue of C^T S C at the start; 0.7 leaves room for
-    headings that grow.
-    """
-    integrator = find(method)
-    chain = problem.chain
-    if integrator.adaptive:
-        return problem.duration / 10
-    if not np.isfinite(integrator.stability_limit):
-        stiffest = np.max(chain.torsion_stiffness)
-        least = np.min(np.asarray(chain.spin_inertia) + np.asarray(chain.density) * np.asarray(chain.radius) ** 2)
-        wave = chain.k * np.sqrt(least / stiffest) if stiffest > 0 else np.inf
-        return float(min(0.5 * wave, problem.duration / 100))
-    omega = np.sqrt(_stiffest(problem))
-    limit = integrator.stability_limit / omega if omega > 0 else np.inf
-    return float(min(0.7 * limit, problem.duration / 100))
-
-
-def _stiffest(problem: Problem) -> float:
-    """Largest eigenvalue of C^T S C at the initial state."""
-    system, z = problem.system, problem.start()
-    shape = system.shape(z.hi, z.lo)
-    c = system.frame(shape)
-
-    def apply(p: NDArray) -> NDArray:
-        move = system.forward(c, p.reshape(z.pi.shape))
-        eps = 1e-6 * problem.chain.k / max(float(np.abs(move).max()), 1e-300)
-        force = system.gradient(system.moved(shape, eps * move)) - system.gradient(system.moved(shape, -eps * move))
-        return system.back(c, force).ravel() / (2 * eps)
-
-    n = z.pi.size
-    if n < 40:
-        return float(np.linalg.eigvalsh(np.array([apply(row) for row in np.eye(n)])).max())
-    start = np.random.default_rng(0).standard_normal(n)
-    operator = LinearOperator((n, n), matvec=apply, dtype=float)
-    return float(eigsh(operator, k=1, which="LA", v0=start, tol=1e-3, return_eigenvectors=False)[0])
 
 
 def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:

@@ -13,8 +13,10 @@ from discs.integrators.gauss import Gauss
 from discs.marching import SimulationError
 from discs.problem import Problem
 from discs.solution import Solution
+from discs.step import suggest_dt
 
 LOOSE = 3e-4  # from here on "auto" takes the midpoint method
+FEWEST = 20  # steps to begin with
 PROBES = 33  # frames that runs are compared at
 SAFETY = 2.0  # steps are not yet small when errors are large: found by experiment
 ATTEMPTS = 14
@@ -39,7 +41,6 @@ def to_tolerance(
     method: str | Integrator,
     tol: float,
     times: NDArray,
-    first: float,
     run: Callable[[Integrator, float, NDArray], Solution],
 ) -> Solution:
     """Run with smaller and smaller steps until the last change says that positions and angles are within `tol`.
@@ -52,7 +53,6 @@ def to_tolerance(
     problem, method : as `simulate` takes them.
     tol : largest error of x, y, theta (and phi) over discs and frames, relative to the largest value of each.
     times : frames, (F,).
-    first : the step to begin with.
     run : (integrator, dt, times) -> Solution.
 
     Returns
@@ -66,7 +66,9 @@ def to_tolerance(
     tol = checks.number("tol", tol, positive=True)
     integrator = method_for(method, tol)
     some = times if times.size <= PROBES else times[np.unique(np.linspace(0, times.size - 1, PROBES).round().astype(int))]
-    steps, last, failures, stalls, estimate = max(4, int(np.ceil(times[-1] / first))), None, 0, 0, np.inf
+    steps, last, failures, stalls, estimate = FEWEST, None, 0, 0, np.inf
+    if np.isfinite(integrator.stability_limit):
+        steps = max(steps, int(np.ceil(times[-1] / suggest_dt(problem, integrator))))
     rows = problem.system.rows
     for attempt in range(1, ATTEMPTS + 1):
         dt = times[-1] / steps

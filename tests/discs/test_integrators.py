@@ -52,6 +52,16 @@ def accurate(model):
     return final(uneven(6, model), Gauss8(tolerance=1e-15, sweeps=12), 150)
 
 
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_says_what_it_is(name):
+    method = find(name)
+    assert method.name == name
+    assert method.order in (2, 4, 5, 6, 8)
+    assert method.stability_limit > 0
+    assert len(method.preserves) > 10
+    assert len(method.reference) > 20
+
+
 @models(SOME)
 def test_the_reference_of_the_orders(model):
     np.testing.assert_allclose(final(uneven(6, model), "rk4", 2000), accurate(model), atol=2e-11)

@@ -3,12 +3,13 @@
 import math
 import subprocess
 import sys
+import time
 
 import numba
 import numpy as np
 import pytest
 
-from discs import Chain, Midpoint, Problem, State, simulate
+from discs import Chain, Midpoint, Problem, State, marching, simulate
 from discs.integrators import METHODS
 from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
@@ -163,6 +164,23 @@ def test_more_discs_than_doubles_can_hold_are_warned_of():
     problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 0.1)
     with pytest.warns(UserWarning, match=r"20001 discs at dt = 0.05: each sweep .* take dt below"):
         simulate(problem, dt=0.05, frames=1, progress=False)
+
+
+class Slow(Midpoint):
+    """A midpoint method that takes as long as one that must be compiled."""
+
+    def kernel(self, *arguments):
+        time.sleep(0.3)
+        return super().kernel(*arguments)
+
+
+@pytest.mark.parametrize("progress", [True, False])
+def test_compiling_is_announced_once(progress, monkeypatch, capsys):
+    monkeypatch.setattr(marching, "_PREPARED", set())
+    monkeypatch.setattr(marching, "NOTICE", 0.05)
+    for _ in range(2):
+        simulate(uneven(5, Model("springs", "field")), Slow(), 0.5, 1, progress=progress)
+    assert capsys.readouterr().err.count("compiling 'midpoint', once on this machine") == progress
 
 
 def test_importing_does_not_compile():

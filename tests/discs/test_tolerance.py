@@ -37,7 +37,7 @@ def test_the_true_error_is_within_the_tolerance(problem, tol):
 
 
 @models([Model("springs", "true"), Model("ring", "field")])
-@pytest.mark.parametrize("method", ["midpoint", "suzuki4", "gauss4", Gauss6(tolerance=1e-11)])
+@pytest.mark.parametrize("method", ["midpoint", "suzuki4", "gauss4", "rk4", Gauss6(tolerance=1e-11)])
 def test_a_method_of_one_s_own_choice(method, model):
     problem = uneven(7, model)
     run = simulate(problem, method, tol=1e-4, frames=3, progress=False)
