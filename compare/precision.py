@@ -222,9 +222,9 @@ def work_precision(
 ) -> WorkPrecision:
     """Measure speed against error at the end of scenes.
 
-    Every method runs from loose to tight settings: once to warm up, then `repeats` times, of which the median counts. A
-    setting that takes
-    longer than `seconds` is run only once, and the method's tighter ones are left out; all is in the table with the reason.
+    Every method runs from loose to tight settings: once to warm up, then `repeats` times, of which the median counts. What takes
+    longer than `seconds`/(4 `repeats`) is run once. A run is cut off after `seconds` and a method after three times that; its
+    tighter settings are left out, and the table says so.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def work_precision(
     n : numbers of discs, with plain springs at free ends.
     methods : problem -> methods to run; None takes ours and the peers that are installed.
     repeats : how often each run is timed.
-    seconds : the longest time for one run.
+    seconds : the longest time for one run; three times that for all runs of a method on a problem.
     progress : show a progress bar.
 
     Raises
@@ -260,7 +260,7 @@ def work_precision(
 
 def _measure(peer: Peer, name: str, n: int, exact: NDArray, ours: bool, repeats: int, limit: float) -> list[Row]:
     """The rows of one method, from loose to tight."""
-    rows = []
+    rows, started = [], clock.perf_counter()
     for setting in peer.settings:
         begun = clock.perf_counter()
         row = Row(name, n, peer.name, ours, setting, np.nan, np.nan, None, None, None, "")
@@ -269,7 +269,7 @@ def _measure(peer: Peer, name: str, n: int, exact: NDArray, ours: bool, repeats:
                 warnings.simplefilter("ignore")
                 found = peer.run(setting, limit)
                 times = [found.seconds]
-                if found.seconds < limit / repeats:
+                if found.seconds < limit / (4 * repeats):
                     times = [peer.run(setting, limit).seconds for _ in range(repeats)]
         except Cutoff:
             rows.append(row._replace(seconds=clock.perf_counter() - begun, remark=f"cut off after {limit:g} s; tighter left out"))
@@ -282,6 +282,7 @@ def _measure(peer: Peer, name: str, n: int, exact: NDArray, ours: bool, repeats:
         remark = "says it succeeded, and is wrong" if off > max(WRONG * tolerance, 0.01) else ""
         row = row._replace(error=off, seconds=float(np.median(times)), steps=found.steps or None, gradients=found.gradients)
         rows.append(row._replace(solves=found.solves, remark=remark))
-        if found.seconds > limit:
+        if clock.perf_counter() - started > 3 * limit and setting != peer.settings[-1]:
+            rows.append(row._replace(error=np.nan, seconds=np.nan, remark=f"tighter left out after {3 * limit:g} s"))
             break
     return rows

@@ -45,8 +45,7 @@ def simulate(
     want : what else to record: "velocity", "slope", "contact_force", and what the method offers (leapfrog: "modified_energy").
     progress : show a progress bar on anything that takes over a second.
     tol : instead of dt: runs with smaller and smaller steps until x, y, theta (and phi) are within this, relative to the
-    largest value of
-        each; see `discs.tolerance`. method="auto" chooses the method too, and takes 1e-3 if it is not given.
+        largest value of each; see `discs.tolerance`. method="auto" chooses the method too, and takes 1e-3 if it is not given.
     engine : "compiled", or "plain" for the same in NumPy and SciPy. Discs with true curvature have only the plain form.
 
     Returns

@@ -171,8 +171,7 @@ class SkewGradient(ABC):
         """Solve (I + g C^T B^T (stiffness) B C) p = rhs for p, of the shape of pi; O(n).
 
         For g > 0 by banded Cholesky, for a complex g by banded elimination. In double precision whatever that of `rhs`, which
-        is enough for a
-        correction: a state in `longdouble` is carried on in extended precision.
+        is enough for a correction: a state in `longdouble` is carried on in extended precision.
         """
         matrix = g * self.stiffness(secant, c)
         matrix[-1] += 1

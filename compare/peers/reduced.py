@@ -1,8 +1,7 @@
 """Peers that take a right-hand side: SciPy, SUNDIALS, diffrax, and the textbook's dense saddle point.
 
 All but the last two get the same compiled function, y. = f(t, y) with y = (x, y, theta, pi, ...) disc by disc, bound to its
-chain so that a
-call costs no more than a call must.
+chain so that a call costs no more than a call must.
 """
 
 import time as clock

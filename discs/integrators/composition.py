@@ -65,8 +65,7 @@ KAHAN_LI = (0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935
 
 class KahanLi6(Composition):
     """Nine midpoint steps, the longest fraction 0.80: of the nine-stage compositions of order 6 the one of least error
-    coefficient that
-    Kahan and Li found."""
+    coefficient that Kahan and Li found."""
 
     name: ClassVar[str] = "kahanli6"
     order: ClassVar[int] = 6

@@ -20,8 +20,7 @@ class Tableau(NamedTuple):
 
     a is diagonalised: `real` holds its real eigenvalues (none or one) and `pairs` the complex ones with a positive imaginary
     part; in : (number, s), rows that take stages to the eigenvector's part, and out : (number, s), what it is in the stages,
-    twice that for
-    pairs, whose conjugates are left out.
+    twice that for pairs, whose conjugates are left out.
     """
 
     a: NDArray
@@ -60,11 +59,11 @@ class Gauss(OneStep, ABC):
     Gauss methods conserve quadratic invariants, H with linear curvature among them.
 
     A sweep takes C at the stages' positions, lets it carry them on, and solves for the change of the P_i with one common C,
-    that in the
-    middle of the step: for this C the equations are linear, I + h^2 a^2 (x) C^T S C, and fall apart along the eigenvectors of a
-    into systems I + h^2 lambda^2 C^T S C, one complex one for each pair. They are factored once a step. (With own headings S is the
-    springs' stiffness without what their tension adds.) Unlike in a midpoint step the energy is exact only when the sweeps have
-    converged; when h is many times larger than the time in which a wave passes from disc to disc they do not, take "midpoint" then.
+    that in the middle of the step: for this C the equations are linear, I + h^2 a^2 (x) C^T S C, and fall apart along the
+    eigenvectors of a into systems I + h^2 lambda^2 C^T S C, one complex one for each pair. They are factored once a step. (With
+    own headings S is the springs' stiffness without what their tension adds.) Unlike in a midpoint step the energy is exact
+    only when the sweeps have converged; when h is many times larger than the time in which a wave passes from disc to disc they
+    do not: take "midpoint" then.
 
     Parameters
     ----------

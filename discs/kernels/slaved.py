@@ -1,9 +1,8 @@
 """The chain of slaved headings, linear curvature, in compiled form; its derivation and its plain twin are `discs.slaved`.
 
 Links are held with one more at each end: link j lies before disc j, link j + 1 after it. Around a ring links 0 and n are the
-same; at free
-ends they are the ghosts that make the headings there central, d_0 = 2 d_1 - d_2 ("springs", "paper") or 3 d_1 - 3 d_2 + d_3
-("consistent").
+same; at free ends they are the ghosts that make the headings there central, d_0 = 2 d_1 - d_2 ("springs", "paper") or
+3 d_1 - 3 d_2 + d_3 ("consistent").
 """
 
 from typing import Any, NamedTuple
@@ -21,8 +20,7 @@ PLAIN, GHOST, RING = 0, 1, 2
 
 class Slaved(NamedTuple):
     """Parameters. radius : (n,). weights : (3, n), inertia against each row's rate. bend : (n,), K w/k**4, against the
-    difference of a
-    disc's links. torsion : (n + 1,), beta/k.
+    difference of a disc's links. torsion : (n + 1,), beta/k.
 
     hessian : (3, n), grad^2 V by x or y: diagonal, i with i + 1, i with i + 2. corner : (2,), 0 with 3 and n - 4 with n - 1.
     twist : (2, n), by theta: diagonal, i with i + 1.

@@ -1,8 +1,8 @@
 """The chain of discs with their own heading in compiled form; its derivation and its plain twin are `discs.steered`.
 
-Links are held with one more at each end: link j lies before disc j. Around a ring links 0 and n are the same; at free ends
-they have
-no stiffness. The cosines of a step's angles come from those of its start and of the step: two pairs for each disc and sweep.
+Links are held with one more at each end: link j lies before disc j. Around a ring links 0 and n are the same; at free ends they
+have no stiffness. The cosines of a step's angles come from those of its start and of the step: two pairs for each disc and
+sweep.
 """
 
 import math
