@@ -139,16 +139,16 @@ OURS = {"midpoint": BLUE, "suzuki4": ORANGE, "gauss6": GREEN, "gauss8": PURPLE, 
 
 
 def precision(study: "WorkPrecision") -> list[Axes]:
-    """Error against time, log-log, a row of panels for each number of discs: our methods in colour, peers in grey, each with
+    """Error against time, log-log, a row of panels for each problem: our methods in colour, peers in grey, each with
     its mark."""
     names = list(dict.fromkeys(name for name, _ in study.problems))
     sizes = list(dict.fromkeys(n for _, n in study.problems))
     peers = list(dict.fromkeys(r.method for r in study.rows if not r.ours))
     marks = dict(zip(peers, ("s", "D", "^", "v", "<", ">", "p", "*", "h", "X", "P", "d", "8", "H", "1", "2"), strict=False))
-    figure = Figure(figsize=(1.0 + 3.9 * len(names), 1.2 + 3.1 * len(sizes)), layout="constrained")
-    grid = figure.subplots(len(sizes), len(names), squeeze=False, sharex=True, sharey=True)
+    figure = Figure(figsize=(1.5 + 3.3 * max(len(sizes), 2), 1.8 + 3.4 * len(names)), layout="constrained")
+    grid = figure.subplots(len(names), len(sizes), squeeze=False, sharex=True, sharey=True)
     shown: dict[str, Any] = {}
-    for (row, n), (column, name) in ((a, b) for a in enumerate(sizes) for b in enumerate(names)):
+    for (row, name), (column, n) in ((a, b) for a in enumerate(names) for b in enumerate(sizes)):
         ax = grid[row, column]
         for method in (*peers, *OURS):
             errors, seconds = study.curve(name, n, method)
@@ -163,10 +163,12 @@ def precision(study: "WorkPrecision") -> list[Axes]:
             shown.setdefault(method, line)
         ax.set_title(f"{name}, N = {n}", fontsize="medium")
         ax.grid(alpha=0.3)
-        if row == len(sizes) - 1:
+        if row == len(names) - 1:
             ax.set_xlabel("wall time (s)")
         if column == 0:
             ax.set_ylabel("relative error of x, y, θ")
     order = [m for m in (*OURS, *peers) if m in shown]
-    figure.legend([shown[m] for m in order], order, loc="outside lower center", ncols=5, fontsize="small", frameon=False)
+    columns = 6 if len(sizes) > 2 else 4
+    lines = [shown[m] for m in order]
+    figure.legend(lines, order, loc="outside lower center", ncols=columns, fontsize="small", frameon=False)
     return list(grid.ravel())
