@@ -45,7 +45,7 @@ class Composition(OneStep, ABC):
         from discs.kernels import methods
 
         fractions = np.array(self.fractions)
-        return methods.compose(chain, hi, lo, pi, fractions, h, steps, self.base.sweeps, self.base.tolerance, bound)
+        return methods.compose(chain, hi, lo, pi, fractions, h, steps, self.base.sweeps, float(self.base.tolerance), bound)
 
 
 SUZUKI = 1 / (4 - 4 ** (1 / 3))

@@ -114,7 +114,7 @@ class Gauss(OneStep, ABC):
         from discs.kernels import methods
 
         coefficients = tuple(tableau(self.stages))
-        return methods.gauss(chain, hi, lo, pi, coefficients, h, steps, self.sweeps, self.tolerance, bound)
+        return methods.gauss(chain, hi, lo, pi, coefficients, h, steps, self.sweeps, float(self.tolerance), bound)
 
 
 class Gauss4(Gauss):

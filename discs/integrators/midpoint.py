@@ -68,4 +68,4 @@ class Midpoint(OneStep):
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
         from discs.kernels import methods
 
-        return methods.compose(chain, hi, lo, pi, np.ones(1), h, steps, self.sweeps, self.tolerance, bound)
+        return methods.compose(chain, hi, lo, pi, np.ones(1), h, steps, self.sweeps, float(self.tolerance), bound)

@@ -62,4 +62,4 @@ class McLachlanPerlmutter(OneStep):
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
         from discs.kernels import methods
 
-        return methods.perlmutter(chain, hi, lo, pi, h, steps, self.sweeps, self.tolerance, bound)
+        return methods.perlmutter(chain, hi, lo, pi, h, steps, self.sweeps, float(self.tolerance), bound)
