@@ -80,8 +80,7 @@ class Bound:
         self.y0 = self.reduced.join(z.hi, z.pi)
         share = np.sqrt(problem.system.weights[2])
         # pi of a disc is small like the root of its share of length: so are the errors allowed
-        one = np.ones_like(z.pi) * share
-        self.unit = self.reduced.join(np.ones_like(z.hi), one)
+        self.unit = self.reduced.join(np.ones_like(z.hi), np.ones_like(z.pi) * share)
         for y in (self.y0, _read_only(self.y0)):  # compiled for both, before any clock runs
             self(0.0, y)
 
