@@ -51,25 +51,74 @@ def factor_few(a, u, w, corner):
                 a[i + 3] -= third * a[i] * third
 
 
+def at(b, i):
+    """b[i], or where b holds two columns (2, n) both of their entries."""
+    return b[i]
+
+
+def put(b, i, x):
+    """b[i] = x, for one column or two."""
+    b[i] = x
+
+
+def less(x, k, y):
+    """x - k y, for one column or two."""
+    return x - k * y
+
+
+def times(x, k):
+    """x k, for one column or two."""
+    return x * k
+
+
+@overload(at, jit_options=PART)
+def _at(b, i):
+    return (lambda b, i: b[i]) if b.ndim == 1 else (lambda b, i: (b[0, i], b[1, i]))
+
+
+@overload(put, jit_options=PART)
+def _put(b, i, x):
+    def one(b, i, x):
+        b[i] = x
+
+    def two(b, i, x):
+        b[0, i], b[1, i] = x
+
+    return one if b.ndim == 1 else two
+
+
+@overload(less, jit_options=PART)
+def _less(x, k, y):
+    if isinstance(x, types.BaseTuple):
+        return lambda x, k, y: (x[0] - k * y[0], x[1] - k * y[1])
+    return lambda x, k, y: x - k * y
+
+
+@overload(times, jit_options=PART)
+def _times(x, k):
+    return (lambda x, k: (x[0] * k, x[1] * k)) if isinstance(x, types.BaseTuple) else (lambda x, k: x * k)
+
+
 @part
 def substitute_few(a, u, w, corner, b):
     """`substitute` for the factors of `factor_few`."""
     n = a.size
     for i in range(n):
         if i + 1 < n:
-            b[i + 1] -= u[i] * b[i]
+            put(b, i + 1, less(at(b, i + 1), u[i], at(b, i)))
         if i + 2 < n:
-            b[i + 2] -= w[i] * b[i]
+            put(b, i + 2, less(at(b, i + 2), w[i], at(b, i)))
         if i + 3 < n and (i == 0 or i == n - 4):
-            b[i + 3] -= corner[0 if i == 0 else 1] * b[i]
+            put(b, i + 3, less(at(b, i + 3), corner[0 if i == 0 else 1], at(b, i)))
     for i in range(n - 1, -1, -1):
-        b[i] *= a[i]
+        x = times(at(b, i), a[i])
         if i + 1 < n:
-            b[i] -= u[i] * b[i + 1]
+            x = less(x, u[i], at(b, i + 1))
         if i + 2 < n:
-            b[i] -= w[i] * b[i + 2]
+            x = less(x, w[i], at(b, i + 2))
         if i + 3 < n and (i == 0 or i == n - 4):
-            b[i] -= corner[0 if i == 0 else 1] * b[i + 3]
+            x = less(x, corner[0 if i == 0 else 1], at(b, i + 3))
+        put(b, i, x)
 
 
 @part
@@ -137,44 +186,52 @@ def factor(a, u, w, corner):
 
 @part
 def substitute(a, u, w, corner, b):
-    """Solve with the factors of `factor`, b (n,) in place."""
+    """Solve with the factors of `factor`, in place; b (n,), or two right sides (2, n), of which the processor does the second
+    while it waits for the first."""
     n = a.size
     if n < FEW:
         substitute_few(a, u, w, corner, b)
         return
     p = (n - 1) // 2
     last = n - 1
-    b[1] -= u[0] * b[0]
-    b[2] -= w[0] * b[0]
-    b[3] -= corner[0] * b[0]
-    b[last - 1] -= u[last - 1] * b[last]
-    b[last - 2] -= w[last - 2] * b[last]
-    b[last - 3] -= corner[1] * b[last]
-    b0, b1 = b[1], b[2]
-    c0, c1 = b[last - 1], b[last - 2]
+    b0, c0 = at(b, 0), at(b, last)
+    put(b, 1, less(at(b, 1), u[0], b0))
+    put(b, 2, less(at(b, 2), w[0], b0))
+    put(b, 3, less(at(b, 3), corner[0], b0))
+    put(b, last - 1, less(at(b, last - 1), u[last - 1], c0))
+    put(b, last - 2, less(at(b, last - 2), w[last - 2], c0))
+    put(b, last - 3, less(at(b, last - 3), corner[1], c0))
+    b0, b1 = at(b, 1), at(b, 2)
+    c0, c1 = at(b, last - 1), at(b, last - 2)
     for i in range(1, n // 2 - 1):
         j = last - i
-        b[i], b[j] = b0, c0
-        b0, b1 = b1 - u[i] * b0, b[i + 2] - w[i] * b0
-        c0, c1 = c1 - u[j - 1] * c0, b[j - 2] - w[j - 2] * c0
+        put(b, i, b0)
+        put(b, j, c0)
+        b0, b1 = less(b1, u[i], b0), less(at(b, i + 2), w[i], b0)
+        c0, c1 = less(c1, u[j - 1], c0), less(at(b, j - 2), w[j - 2], c0)
     i = n // 2 - 1
     if n % 2:
-        b[i] = b0
-        b0, b1 = b1 - u[i] * b0, b[i + 2] - w[i] * b0
-    b0 += c1 - b[p]
-    b1 += c0 - b[p + 1]
-    b1 = (b1 - u[p] * b0) * a[p + 1]
-    b0 = b0 * a[p] - u[p] * b1
-    b[p], b[p + 1] = b0, b1
+        put(b, i, b0)
+        b0, b1 = less(b1, u[i], b0), less(at(b, i + 2), w[i], b0)
+    # what came up to p and p + 1 is c1 and c0, on the same entries
+    b0 = less(less(b0, -1.0, c1), 1.0, at(b, p))
+    b1 = less(less(b1, -1.0, c0), 1.0, at(b, p + 1))
+    b1 = times(less(b1, u[p], b0), a[p + 1])
+    b0 = less(times(b0, a[p]), u[p], b1)
+    put(b, p, b0)
+    put(b, p + 1, b1)
     c0, c1 = b1, b0  # the nearest and the next solved below row j; b0, b1 above row i
     if n % 2:
         i = p - 1
-        b0, b1 = (b[i] * a[i] - w[i] * b1) - u[i] * b0, b0
-        b[i] = b0
+        b0, b1 = less(less(times(at(b, i), a[i]), w[i], b1), u[i], b0), b0
+        put(b, i, b0)
     for i in range(n // 2 - 2, 0, -1):
         j = last - i
-        b0, b1 = (b[i] * a[i] - w[i] * b1) - u[i] * b0, b0
-        c0, c1 = (b[j] * a[j] - w[j - 2] * c1) - u[j - 1] * c0, c0
-        b[i], b[j] = b0, c0
-    b[0] = (b[0] * a[0] - corner[0] * b[3] - w[0] * b[2]) - u[0] * b[1]
-    b[last] = (b[last] * a[last] - corner[1] * b[last - 3] - w[last - 2] * b[last - 2]) - u[last - 1] * b[last - 1]
+        b0, b1 = less(less(times(at(b, i), a[i]), w[i], b1), u[i], b0), b0
+        c0, c1 = less(less(times(at(b, j), a[j]), w[j - 2], c1), u[j - 1], c0), c0
+        put(b, i, b0)
+        put(b, j, c0)
+    end = less(less(times(at(b, 0), a[0]), corner[0], at(b, 3)), w[0], at(b, 2))
+    put(b, 0, less(end, u[0], at(b, 1)))
+    end = less(less(times(at(b, last), a[last]), corner[1], at(b, last - 3)), w[last - 2], at(b, last - 2))
+    put(b, last, less(end, u[last - 1], at(b, last - 1)))

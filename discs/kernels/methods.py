@@ -327,7 +327,7 @@ def observe(chain, hi, lo, v, q):
 @kernel
 def reduced(chain, y, out):
     """The reduced equations q. = C pi, pi. = -C^T grad V for y = (q, pi), disc by disc, (n (rows + columns),)."""
-    n, rows = chain.radius.size, chain.scale.size
+    n, rows = chain.weights.shape[1], chain.scale.size
     columns = rows - 2
     work, hi, v, c = do.workspace(chain), np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n))
     still, p, g = np.zeros((rows, n)), np.empty((columns, n)), np.empty((columns, n))

@@ -15,12 +15,12 @@ def copy(a, to):
 
 
 @part
-def forward(c, p, v):
-    """v = C p."""
+def forward(c, p, v, tau=1.0):
+    """v = tau C p."""
     for row in range(c.shape[0]):
         a, q, to = c[row], p[row // 3], v[row]
         for i in range(to.size):
-            to[i] = a[i] * q[i]
+            to[i] = tau * a[i] * q[i]
 
 
 @part

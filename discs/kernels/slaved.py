@@ -267,8 +267,7 @@ def border(m):
     second[n - 3] += edge[3]
     second[0] += edge[4]
     second[1] += edge[5]
-    banded.substitute(m.a[: n - 2], m.u[: n - 2], m.w[: n - 2], m.corner, first)
-    banded.substitute(m.a[: n - 2], m.u[: n - 2], m.w[: n - 2], m.corner, second)
+    banded.substitute(m.a[: n - 2], m.u[: n - 2], m.w[: n - 2], m.corner, m.columns[:, : n - 2])
     x = m.a[n - 2] - (edge[0] * first[n - 4] + edge[1] * first[n - 3] + edge[2] * first[0])
     y = m.u[n - 2] - (edge[0] * second[n - 4] + edge[1] * second[n - 3] + edge[2] * second[0])
     z = m.a[n - 1] - (edge[3] * second[n - 3] + edge[4] * second[0] + edge[5] * second[1])

@@ -19,15 +19,14 @@ from discs.kernels.shared import forward, renew
 
 
 class Steered(NamedTuple):
-    """Parameters. radius : (n,). weights : (4, n), inertia against each row's rate. roots : (2, n), of the inertia against
-    roll and turning.
+    """Parameters. weights : (4, n), inertia against each row's rate. paces : (3, n), rates of contact point, roll and heading per
+    unit of momentum.
 
     stiffness : (4, n + 1), k times that against stretch, shear, torsion and bending. shift : (4,), advance along a ring.
     """
 
-    radius: NDArray
     weights: NDArray
-    roots: NDArray
+    paces: NDArray
     stiffness: NDArray
     scale: NDArray
     shift: NDArray
@@ -43,7 +42,8 @@ def parameters(
     padded = np.zeros((4, given.n + 1))
     padded[:, 1 : 1 + stiffness.shape[1]] = stiffness
     padded[:, 0] = padded[:, -1]
-    return Steered(np.array(given.radius), weights, roots, padded, scale, shift, given.k, ring)
+    paces = np.stack([given.radius / roots[0], 1 / roots[0], 1 / roots[1]])
+    return Steered(weights, paces, padded, scale, shift, given.k, ring)
 
 
 class Matrix(NamedTuple):
@@ -111,7 +111,7 @@ def turn(x):
 
 @fill(chain.workspace, Steered, _nrt=True)
 def _workspace(chain):
-    n = chain.radius.size
+    n = chain.weights.shape[1]
     base, angles, strain = np.zeros((4, n + 1)), np.zeros((4, n + 1)), np.zeros((4, n + 1))
     links, turned, along, tension = np.zeros((4, n + 1)), np.zeros((2, n + 1)), np.zeros((2, n + 1)), np.zeros((4, n + 1))
     matrix = Matrix(np.empty((3, n)), np.empty((4, n)), np.empty((2, 2, n)), np.empty(11))
@@ -122,7 +122,7 @@ def _workspace(chain):
 
 @fill(chain.factors, Steered, _nrt=True)
 def _factors(chain, g):
-    n, kind = chain.radius.size, np.array([g])
+    n, kind = chain.weights.shape[1], np.array([g])
     return Matrix(
         np.empty((3, n), kind.dtype), np.empty((4, n), kind.dtype), np.empty((2, 2, n), kind.dtype), np.empty(11, kind.dtype)
     )
@@ -174,15 +174,12 @@ def frame_of(chain, work, dphi, c):
     """C after headings have turned by dphi."""
     cos, sin = work.angles[0], work.angles[1]
     cx, cy, ct, cp = c[0], c[1], c[2], c[3]
-    radius, roll, heading = chain.radius, chain.roots[0], chain.roots[1]
+    point, roll, heading = chain.paces[0], chain.paces[1], chain.paces[2]
     for i in range(dphi.size):
         a, b = turn(dphi[i])
-        t = 1 / roll[i]
-        e = radius[i] * t
-        cx[i] = -e * (sin[i] * a + cos[i] * b)
-        cy[i] = e * (cos[i] * a - sin[i] * b)
-        ct[i] = t
-        cp[i] = 1 / heading[i]
+        cx[i] = -point[i] * (sin[i] * a + cos[i] * b)
+        cy[i] = point[i] * (cos[i] * a - sin[i] * b)
+        ct[i], cp[i] = roll[i], heading[i]
 
 
 @part
@@ -436,10 +433,7 @@ def _sweep(chain, work, h, pi, p, move):
     half = 0.5 * h
     c, b, m = work.c, work.rhs, work.matrix
     frame_of(chain, work, move[3], c)
-    forward(c, p, work.step)
-    for row in range(4):
-        for i in range(n):
-            work.step[row, i] *= half
+    forward(c, p, work.step, half)
     secant(chain, work, work.step, True)
     tensions(chain, work)
     pulled(work, c, b)

@@ -88,9 +88,10 @@ def dense_banded(a, u, w, corner):
 @pytest.mark.parametrize("kind", [float, complex])
 def test_pentadiagonal_elimination(kind):
     @numba.njit
-    def solve(a, u, w, corner, b):
+    def solve(a, u, w, corner, b, pair):
         banded.factor(a, u, w, corner)
         banded.substitute(a, u, w, corner, b)
+        banded.substitute(a, u, w, corner, pair)
 
     rng = np.random.default_rng(2)
 
@@ -101,9 +102,11 @@ def test_pentadiagonal_elimination(kind):
         a, u, w, corner, b = some(n) + 12, some(n), some(n), some(2), some(n)
         corner[1] *= n > 4
         corner[0] *= n > 3
-        expected = np.linalg.solve(dense_banded(a, u, w, corner), b)
-        solve(a, u, w, corner, b)
-        np.testing.assert_allclose(b, expected, atol=1e-14, err_msg=f"n = {n}")
+        pair = np.stack([b, some(n)])
+        expected = np.linalg.solve(dense_banded(a, u, w, corner), pair.T).T
+        solve(a, u, w, corner, b, pair)
+        np.testing.assert_allclose(b, expected[0], atol=1e-14, err_msg=f"n = {n}")
+        np.testing.assert_allclose(pair, expected, atol=1e-14, err_msg=f"n = {n}")
 
 
 @pytest.mark.parametrize("kind", [float, complex])
