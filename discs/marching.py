@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from discs.chain import Chain
 from discs.integrators import Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
-from discs.system import Phase
+from discs.system import Phase, SkewGradient
 
 NOTICE = 2.0  # seconds of compiling after which it is said
 _PREPARED: set[tuple[type, type]] = set()
@@ -35,21 +34,16 @@ class SimulationError(RuntimeError):
         return type(self), (self.message, self.step, self.time, self.disc)
 
 
-def _warn_of_lost_digits(problem: Problem, h: float) -> None:
-    """Warn where solves with I + h^2/4 C^T S C, whose entries reach 4 h^2 K R^2/(M k^4), lose the digits that sweeps would win
-    back.
+def _warn_of_lost_digits(system: SkewGradient, h: float) -> None:
+    """Warn where solves with I + h^2/4 C^T S C lose the digits that sweeps would win back.
 
-    A sweep multiplies what is still wrong by that times the unit of rounding, 1.1e-16: they stop converging when it comes near one.
+    A sweep multiplies what is still wrong by the largest entry, h^2 `stiffest`, times the unit of rounding, 1.1e-16: sweeps stop
+    converging when that comes near one.
     """
-    chain = problem.chain
-    if not isinstance(chain, Chain):
-        return
-    radius = np.asarray(chain.radius)
-    per_stiffness = np.max(radius**2 / (np.asarray(chain.spin_inertia) + np.asarray(chain.density) * radius**2))
-    lost = 1.1e-16 * 4 * h**2 * np.max(chain.bending_stiffness) * per_stiffness / chain.k**4
+    lost = 1.1e-16 * h**2 * system.stiffest
     if lost > 0.1:
         warnings.warn(
-            f"{chain.n} discs at dt = {h:g}: each sweep of a step keeps {lost:.1g} of what is wrong, by rounding, and the run "
+            f"{system.n} discs at dt = {h:g}: each sweep of a step keeps {lost:.1g} of what is wrong, by rounding, and the run "
             f"may not be trusted; take dt below {h * np.sqrt(0.1 / lost):.1g}, or fewer discs",
             stacklevel=4,
         )
@@ -77,12 +71,9 @@ class March:
         self.kernel = self.system.kernel if compiled else None
         self.compiled = self.kernel is not None and not integrator.adaptive
         self.chunk = max(1, CHUNK // self.system.n)
-        # V >= 0 and H is constant, so the kinetic energy cannot exceed H; far below one unit of twist is rounding
-        chain = problem.chain
-        rounding = 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
-        self.bound = 10 * problem.energy() + rounding
+        self.bound = problem.blown_up
         if integrator.stability_limit == np.inf and not integrator.adaptive:
-            _warn_of_lost_digits(problem, h)
+            _warn_of_lost_digits(self.system, h)
         self.memory: Any = integrator.begin(self.system, problem.start(), h, self.work, self.kernel)
         if self.kernel is not None:
             self._prepare(quiet)

@@ -103,6 +103,15 @@ class Problem:
         rates = np.array([self.initial.omega, self.initial.phi_rate])
         return Phase(q, np.zeros_like(q), self.system.momentum(self.system.shape(q), rates))
 
+    @cached_property
+    def blown_up(self) -> float:
+        """Kinetic energy that no motion comes near: V >= 0 and H is constant, so it cannot exceed H; ten times that.
+
+        Far below one unit of twist is rounding.
+        """
+        chain = self.chain
+        return 10 * self.energy() + 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
+
     def energy(self, state: State | None = None) -> float:
         """Kinetic and potential energy of a state, the initial one by default."""
         return self._energy if state is None else Problem(self.chain, state, self.duration)._energy

@@ -73,6 +73,7 @@ class SteeredSystem(SkewGradient):
         self._roots = np.sqrt(np.array([spin + mass * self._radius**2, turn]))
         stiff = chain.stretch_stiffness, chain.shear_stiffness, chain.torsion_stiffness, chain.bending_stiffness
         self._stiffness = chain.k * np.array(stiff)
+        self.stiffest = 4 * float(np.max(self._stiffness) / np.min(self._roots) ** 2) / chain.k**2
 
     # Kinematics
 

@@ -53,6 +53,7 @@ class SkewGradient(ABC):
     quadratic : whether V is quadratic, so that secants do not depend on the step.
     closed : whether the chain is a ring.
     reach : how many discs to either side a disc's rates depend on.
+    stiffest : bound of the entries of C^T (grad^2 V) C, per time squared.
     """
 
     n: int
@@ -62,6 +63,7 @@ class SkewGradient(ABC):
     quadratic: bool
     closed: bool
     reach: int
+    stiffest: float
 
     # Kinematics
 
