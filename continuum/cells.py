@@ -1,7 +1,7 @@
 r"""Discrete field theory on cells, the paper's sections 4.1 and 4.2, with SymPy.
 
-A discrete field has values y_{n,i} at time level n and node i, written y[n, i] with a SymPy IndexedBase y. The discrete Lagrangian L_d is
-a function of the values in a cell (6cell), levels n and n+1, any nodes about i; its action sum is the sum over all cells
+A discrete field has values y_{n,i} at time level n and node i, written y[n, i] with a SymPy IndexedBase y. The discrete Lagrangian
+L_d is a function of the values in a cell (6cell), levels n and n+1, any nodes about i; its action sum is the sum over all cells
 (actionsum). A value y_{n,i} stands in several cells, in each at another of its points p, and the action sum is stationary where
 
     E = sum_p D_p L_d (cell that has (n, i) as its point p) = 0,
@@ -9,8 +9,8 @@ a function of the values in a cell (6cell), levels n and n+1, any nodes about i;
 the discrete Euler-Lagrange field equations (discEL), D_1 + ... + D_6 for the six points of (6cell).
 
 A constraint is first made discrete in s only: phi_half, a function of values at level n and of the velocities at (n, i), written
-`velocity(y)`. Its reaction force is Phi = S*(d phi_half) = (dphi_half/dy.^a) dy^a, at node i. Differences in place of the velocities turn
-Phi into a form in the values and phi_half into the constraint phi_d. With multipliers, the discrete d'Alembert principle gives (discNH):
+`velocity(y)`. Its reaction force is Phi = S*(d phi_half) = (dphi_half/dy.^a) dy^a, at node i. Differences in place of the
+velocities turn Phi into a form in the values and phi_half into the constraint phi_d. By the discrete d'Alembert principle (discNH)
 
     E_a = lambda_alpha Phi^alpha_a,   phi_d^alpha = 0.
 
@@ -81,7 +81,8 @@ def in_space(expression: Any, coordinates: tuple[sy.Symbol, sy.Symbol], forward:
     ValueError : for another derivative.
     """
     t, s = coordinates
-    expression, rules = sy.sympify(expression).doit(), {}
+    expression = sy.sympify(expression).doit()
+    rules: dict[sy.Expr, sy.Expr] = {}
     for y in (f for f in expression.atoms(AppliedUndef) if f.args == (t, s)):
         base = sy.IndexedBase(y.func.__name__)
         before, here, after = (base[n, i + step] for step in (-1, 0, 1))
@@ -170,9 +171,8 @@ class CellTheory:
             self._check("L_d", part.expression, (0, 1))
         reached = {(p.field, p.level) for part in self.lagrangian for p in points(part.expression).values()}
         if reached != {(y, level) for y in self.fields for level in (0, 1)}:
-            raise ValueError(
-                f"L_d must have values of levels n and n + 1 of each field; got {[p.expression for p in self.lagrangian]}"
-            )
+            given = ", ".join(str(part.expression) for part in self.lagrangian)
+            raise ValueError(f"L_d must have values of levels n and n + 1 of each field; got {given}")
         for constraint, phi, row in zip(self.constraints, self.discrete_constraints, self.forces, strict=True):
             self._check("phi_half", constraint.expression, (0,))
             self._check("phi_d", phi, (-1, 0, 1))

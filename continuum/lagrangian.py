@@ -9,22 +9,23 @@ dL/dy_{nu mu} is half of SymPy's derivative where nu and mu differ. With the mom
 the Euler-Lagrange expression (2ndEL) is E_a = dL/dy^a - D_nu p_a^nu.
 
 Constraint forces are Chetaev's, (constrforms): Phi^alpha = A^alpha_a dy^a, A^alpha_a = dphi^alpha/dy^a_0. The nonholonomic field
-equations are E_a = lambda_alpha A^alpha_a and phi^alpha = 0 (eq:nh). The vakonomic ones, for comparison, are those of the Lagrangian
-L + lambda_alpha phi^alpha, in which the multipliers are fields like the others and get differentiated.
+equations are E_a = lambda_alpha A^alpha_a and phi^alpha = 0 (eq:nh). The vakonomic ones, for comparison, are those of the
+Lagrangian L + lambda_alpha phi^alpha, in which the multipliers are fields like the others and get differentiated.
 
 Momentum map. A generator xi = xi^mu d/dx^mu + xi^a d/dy^a moves a section by Q^a = xi^a - y^a_mu xi^mu. Sorted by contact forms,
 the Cartan form (2ndcartan) reads
 
-    Theta = L d^{n+1}x + p_a^nu (dy^a - y^a_sigma dx^sigma) ^ d^n x_nu + dL/dy^a_{nu mu} (dy^a_nu - y^a_{nu sigma} dx^sigma) ^ d^n x_mu.
+    Theta = L d^{n+1}x + p_a^nu (dy^a - y^a_sigma dx^sigma) ^ d^n x_nu
+            + dL/dy^a_{nu mu} (dy^a_nu - y^a_{nu sigma} dx^sigma) ^ d^n x_mu.
 
-Contact forms vanish along a section, and the prolonged xi contracts them to Q^a and D_nu Q^a. So the momentum map along a section is
+Contact forms vanish along a section, and the prolonged xi contracts them to Q^a and D_nu Q^a. The momentum map along a section is
 
     J_xi = j^mu d^n x_mu,   j^mu = L xi^mu + p_a^mu Q^a + dL/dy^a_{nu mu} D_nu Q^a,
 
-for a rod j^0 ds - j^1 dt. Integrating by parts, D_mu j^mu = pr xi(L) + L D_mu xi^mu - Q^a E_a. The first two terms are what the symmetry
-leaves of L; by the field equations the last is lambda_alpha times A^alpha_a Q^a, the coefficient of xi contracted with the form
-A^alpha_a (dy^a - y^a_mu dx^mu) ^ d^n x_0 of (bundleF). Both vanish: J_xi is conserved (NHnoether). Otherwise D_mu j^mu is the
-source that the nonholonomic momentum equation has.
+for a rod j^0 ds - j^1 dt. Integrating by parts, D_mu j^mu = pr xi(L) + L D_mu xi^mu - Q^a E_a. The first two terms vanish for a
+symmetry of L. By the field equations the last is -lambda_alpha A^alpha_a Q^a, and A^alpha_a Q^a is what xi contracted with the form
+A^alpha_a (dy^a - y^a_mu dx^mu) ^ d^n x_0 of (bundleF) is along a section, times d^n x_0. Where it is 0 too, J_xi is conserved
+(NHnoether); elsewhere this is the nonholonomic momentum equation.
 """
 
 from collections.abc import Mapping
@@ -37,6 +38,12 @@ import sympy as sy
 from sympy.core.function import AppliedUndef
 
 Generator = Mapping[Any, Any]
+
+
+def _simple(expression: sy.Expr) -> sy.Expr:
+    """Simplified; most zeros only need expanding, which is much faster."""
+    expanded = sy.expand(expression)
+    return expanded if expanded == 0 else sy.simplify(expanded)
 
 
 class Noether(NamedTuple):
@@ -224,12 +231,12 @@ class FieldTheory:
         change += sum(moves[y].diff(mu) * first for (y, mu), first in self._first.items())
         change += sum(moves[y].diff(mu, nu) * second for (y, mu, nu), second in self._second.items())
         work = [sum(a * q for a, q in zip(row, moves.values(), strict=True)) for row in self.forces]
-        return Noether(sy.simplify(change), tuple(self._on_constraints(w) for w in work))
+        return Noether(_simple(change), tuple(self._on_constraints(w) for w in work))
 
     def _on_constraints(self, expression: sy.Expr) -> sy.Expr:
         """An expression in first derivatives on the constraint manifold: what it is on a branch where it is not 0, if any."""
         for branch in self._branches:
-            value = sy.simplify(expression.xreplace(branch))
+            value = _simple(expression.xreplace(branch))
             if value != 0:
                 return value
         return sy.S.Zero

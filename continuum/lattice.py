@@ -1,13 +1,14 @@
 """A `CellTheory` on a lattice of nodes: residuals, their derivatives, and steps in time.
 
-Each part of the discrete Lagrangian is evaluated in all its cells at once, and its derivative by each of their points is added to the
-node that the point is: the sum D_1 + ... + D_6 of (discEL), which also gives the natural conditions at free ends, where cells are
-missing. A step takes two levels q_{n-1}, q_n to the next: it solves (discNH) and phi_d = 0 for q_{n+1} and the multipliers, by
+Each part of the discrete Lagrangian is evaluated in all its cells at once, and its derivative by each of their points is added to
+the node that the point is: the sum D_1 + ... + D_6 of (discEL), which also gives the natural conditions at free ends, where cells
+are missing. A step takes two levels q_{n-1}, q_n to the next: it solves (discNH) and phi_d = 0 for q_{n+1} and the multipliers, by
 Newton's method with exact derivatives in sparse matrices, or by one linear solve where both are linear in these.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ class Path(NamedTuple):
 class _Place(NamedTuple):
     """Where an argument stands in u = (q_{n-1}, q_n, q_{n+1}, lambda), flat, for each cell; and what to add on further turns."""
 
-    index: NDArray
+    at: NDArray
     jump: NDArray | float = 0.0
 
 
@@ -55,9 +56,9 @@ class _Term:
         self, cells: NDArray, expressions: Sequence[tuple[sy.Expr, NDArray]], arguments: Mapping[sy.Expr, _Place], known: int
     ) -> None:
         self._cells = cells
-        self._index = np.array([place.index for place in arguments.values()])
+        self._index = np.array([place.at for place in arguments.values()])
         self._jump = np.array([np.broadcast_to(place.jump, cells.shape) for place in arguments.values()])
-        unknown = {a: place.index - known for a, place in arguments.items() if (place.index >= known).all()}
+        unknown = {a: place.at - known for a, place in arguments.items() if (place.at >= known).all()}
         self.rows = np.array([rows for _, rows in expressions])
         slopes = [(e.diff(a), rows, columns) for e, rows in expressions for a, columns in unknown.items()]
         slopes = [entry for entry in slopes if entry[0] != 0]
@@ -130,8 +131,7 @@ class Lattice:
     def _numeric(self, expression: sy.Expr) -> sy.Expr:
         """An expression with numbers for its symbols."""
         plain = sy.sympify(expression).xreplace(self._numbers)
-        missing = {a for a in plain.free_symbols if not isinstance(a, sy.Indexed)} - {i}
-        missing -= set().union(*(value.free_symbols for value in plain.atoms(sy.Indexed))) - {i}
+        missing = plain.xreplace(dict.fromkeys(plain.atoms(sy.Indexed), sy.S.Zero)).free_symbols - {i}
         if missing:
             raise ValueError(f"values must have a number for every symbol; missing: {', '.join(sorted(map(str, missing)))}")
         return plain
@@ -147,9 +147,7 @@ class Lattice:
         except IndexError:
             raise ValueError(f"cells must be among the {self.nodes} nodes of the lattice; got {part.cells}") from None
         if chosen.size and (chosen.min() + min(offsets) < 0 or chosen.max() + max(offsets) >= self.nodes):
-            raise ValueError(
-                f"cells must lie on the lattice of {self.nodes} nodes; those at {part.cells} of {part.expression} leave it"
-            )
+            raise ValueError(f"cells must lie on the lattice of {self.nodes} nodes; {part.expression} at {part.cells} leaves it")
         return chosen
 
     def _place(self, point: Point, cells: NDArray) -> _Place:
@@ -165,7 +163,7 @@ class Lattice:
         terms = []
         for level in (0, 1):
             arguments = {value: self._place(p._replace(level=p.level - level), cells) for value, p in values.items()}
-            slopes = [(expression.diff(v), arguments[v].index - self._size) for v, p in values.items() if p.level == level]
+            slopes = [(expression.diff(v), arguments[v].at - self._size) for v, p in values.items() if p.level == level]
             terms += [_Term(cells, slopes, arguments, 2 * self._size)] if slopes else []
         return terms
 
@@ -196,7 +194,7 @@ class Lattice:
     def action(self, values: ArrayLike) -> float:
         """The action sum (actionsum) of levels (F, fields, nodes), in units of h k."""
         levels = [self._level("a level", level).ravel() for level in np.asarray(values, dtype=float)]
-        pairs = zip(levels[:-1], levels[1:], strict=True)
+        pairs = list(pairwise(levels))
         return float(sum(term.values(np.concatenate([now, now, after])).sum() for now, after in pairs for term in self._densities))
 
     def _residual(self, u: NDArray) -> NDArray:
