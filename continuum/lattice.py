@@ -131,7 +131,8 @@ class Lattice:
     def _numeric(self, expression: sy.Expr) -> sy.Expr:
         """An expression with numbers for its symbols."""
         plain = sy.sympify(expression).xreplace(self._numbers)
-        missing = plain.xreplace(dict.fromkeys(plain.atoms(sy.Indexed), sy.S.Zero)).free_symbols - {i}
+        names = {value: sy.Dummy() for value in plain.atoms(sy.Indexed)}
+        missing = plain.xreplace(names).free_symbols - {i, *names.values()}
         if missing:
             raise ValueError(f"values must have a number for every symbol; missing: {', '.join(sorted(map(str, missing)))}")
         return plain
@@ -206,7 +207,9 @@ class Lattice:
         entries = np.concatenate([term.slopes(u).ravel() for term in self._terms])
         return sp.csc_array((entries, tuple(self._pattern)), shape=(self._size + self.n_multipliers,) * 2)
 
-    def residual(self, before: ArrayLike, now: ArrayLike, after: ArrayLike, multipliers: ArrayLike = ()) -> tuple[NDArray, NDArray]:
+    def residual(
+        self, before: ArrayLike, now: ArrayLike, after: ArrayLike, multipliers: ArrayLike = 0.0
+    ) -> tuple[NDArray, NDArray]:
         """What a solution makes vanish: E_a - lambda_alpha Phi^alpha_a (fields, nodes) and phi_d (C,); (discNH).
 
         Parameters
