@@ -171,8 +171,8 @@ class CellTheory:
             self._check("L_d", part.expression, (0, 1))
         reached = {(p.field, p.level) for part in self.lagrangian for p in points(part.expression).values()}
         if reached != {(y, level) for y in self.fields for level in (0, 1)}:
-            given = ", ".join(str(part.expression) for part in self.lagrangian)
-            raise ValueError(f"L_d must have values of levels n and n + 1 of each field; got {given}")
+            whole = " + ".join(str(part.expression) for part in self.lagrangian)
+            raise ValueError(f"L_d must have values of levels n and n + 1 of each field; got {whole}")
         for constraint, phi, row in zip(self.constraints, self.discrete_constraints, self.forces, strict=True):
             self._check("phi_half", constraint.expression, (0,))
             self._check("phi_d", phi, (-1, 0, 1))
