@@ -218,7 +218,8 @@ class FieldTheory:
     def noether(self, xi: Generator) -> Noether:
         """Whether a generator, given as for `momentum`, keeps the Lagrangian and is annihilated by the constraint forces.
 
-        Along solutions D_mu j^mu = invariance - lambda_alpha work^alpha, conserved or not.
+        Along solutions D_mu j^mu = invariance - lambda_alpha work^alpha, conserved or not. L must be invariant itself, as in the
+        paper; a symmetry up to a divergence shows that divergence as its invariance.
 
         Raises
         ------

@@ -56,7 +56,7 @@ class _Term:
         self, cells: NDArray, expressions: Sequence[tuple[sy.Expr, NDArray]], arguments: Mapping[sy.Expr, _Place], known: int
     ) -> None:
         self._cells = cells
-        self._index = np.array([place.at for place in arguments.values()])
+        self._index = np.array([place.at for place in arguments.values()], dtype=int)
         self._jump = np.array([np.broadcast_to(place.jump, cells.shape) for place in arguments.values()])
         unknown = {a: place.at - known for a, place in arguments.items() if (place.at >= known).all()}
         self.rows = np.array([rows for _, rows in expressions])
@@ -105,7 +105,8 @@ class Lattice:
 
     Raises
     ------
-    ValueError : for a symbol without a number, cells that leave the lattice, or a shift of a lattice with free ends.
+    ValueError : for a symbol without a number, cells that leave the lattice, fewer nodes than a cell takes, or a shift of a
+        lattice with free ends.
     """
 
     def __init__(
@@ -142,6 +143,8 @@ class Lattice:
         every = np.arange(self.nodes)
         offsets = [0] if self.closed else [0, *(p.offset for p in reached)]
         if part.cells is None:
+            least = 1 + max(offsets) - min(offsets)
+            checks.whole("nodes", self.nodes, least, f"a cell of {part.expression} takes as many")
             return every[-min(offsets) : self.nodes - max(offsets)]
         try:
             chosen = np.atleast_1d(every[part.cells])

@@ -287,7 +287,7 @@ def test_residual_is_the_gradient_of_the_action_sum(closed):
     """(variations), by differences of the action sum; unequal along s, and free ends where cells are missing."""
     mean = (u[n + 1, i - 1] + u[n, i + 1]) / 2
     density = (1 + i / 10) * (u[n + 1, i] - u[n, i]) ** 2 + sy.sin(mean) * x[n, i] ** 2 + (x[n + 1, i + 1] - x[n, i]) ** 4
-    theory = CellTheory([Part(density), Part(x[n + 1, i] ** 3 * u[n, i + 1], 0)], (u, x))
+    theory = CellTheory([Part(density), Part(x[n + 1, i] ** 3 * u[n, i + 1], 0), Part(1)], (u, x))
     lattice = Lattice(theory, 6, {}, closed=closed)
     path = np.random.default_rng(7).normal(size=(3, 2, 6))
     equations, constraints = lattice.residual(*path)
@@ -330,6 +330,10 @@ def test_bad_lattices():
         (lambda: Lattice(theory, 5, {rho: 1.3, h: 0.1}), "values must have a number for every symbol; missing: T, k"),
         (lambda: Lattice(theory, 5, values | {rho: "heavy"}), "rho must be a finite number; got 'heavy'"),
         (lambda: Lattice(theory, 0, values), "nodes must be a whole number of at least 1"),
+        (
+            lambda: Lattice(CellTheory([sum(STRING), u[n, i + 7] * u[n, i]], u), 5, values),
+            "nodes must be a whole number of at least 8",
+        ),
         (lambda: Lattice(theory, 5, values, shift=[1.0]), "shift belongs to a closed lattice"),
         (lambda: Lattice(CellTheory([sum(STRING), Part(STRING[1], -1)], u), 5, values), "cells must lie on the lattice of 5 nodes"),
         (lambda: Lattice(CellTheory([sum(STRING), Part(STRING[0], 7)], u), 5, values), "among the 5 nodes of the lattice; got 7"),

@@ -3,6 +3,9 @@
 Where the paper misprints, a test states the printed formula and the right one, and what is wrong with the first.
 """
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import sympy as sy
@@ -296,6 +299,12 @@ def test_what_is_no_symmetry():
     assert wave.noether({t: t, s: s}).conserved  # scaling
     assert wave.noether({t: s, s: t}).conserved  # boost
     assert not wave.noether({t: t}).conserved
+
+
+def test_continuum_does_not_import_sympy():
+    """It takes longer to import than all the rest; only these modules need it."""
+    code = "import sys, continuum; sys.exit('sympy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_bad_input():
