@@ -29,6 +29,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
+from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, spsolve
 
@@ -152,27 +153,23 @@ class MechanicalSystem:
 
     # The equations
 
-    def saddle_point(self, q: NDArray) -> sp.csc_array:
-        """The matrix [[M, A^T], [A, 0]], (m + c, m + c)."""
-        m, a = sp.coo_array(self.mass(q)), sp.coo_array(self.constraint(q))
-        size, below = len(self.names), len(self.names) + len(self.owners)
-        row, column = a.coords[0] + size, a.coords[1]
+    def saddle_point(self, q: NDArray) -> Any:
+        """The matrix [[M, A^T], [A, 0]], (m + c, m + c), sparse if A is."""
+        m, a = self.mass(q), self.constraint(q)
+        if not sp.issparse(a):
+            return np.block([[m, a.T], [a, np.zeros((len(a), len(a)))]])
+        m, a = sp.coo_array(m), sp.coo_array(a)
+        row, column = a.coords[0] + m.shape[0], a.coords[1]
         places = np.concatenate([m.coords[0], row, column]), np.concatenate([m.coords[1], column, row])
-        return sp.csc_array(sp.coo_array((np.concatenate([m.data, a.data, a.data]), places), shape=(below, below)))
+        size = m.shape[0] + a.shape[0]
+        return sp.csc_array(sp.coo_array((np.concatenate([m.data, a.data, a.data]), places), shape=(size, size)))
 
     def _solve(self, q: NDArray, f: NDArray, g: NDArray) -> Motion:
         """u and lambda with M u = f + A^T lambda, A u = g."""
-        matrix = self.saddle_point(q)
-        try:
-            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-            pivots = np.abs(factors.U.diagonal())
-            singular = not pivots.min() > SINGULAR * pivots.max()
-        except RuntimeError:
-            singular = True
-        if singular:
+        pivots, solve = _factors(self.saddle_point(q))
+        if not pivots.min() > SINGULAR * pivots.max():
             self._explain(q, g)
-            factors = splu(matrix)
-        unknowns = factors.solve(np.concatenate([f, g]))
+        unknowns = solve(np.concatenate([f, g]))
         return Motion(unknowns[: len(f)], -unknowns[len(f) :])
 
     def _explain(self, q: NDArray, g: NDArray) -> None:
@@ -289,6 +286,18 @@ class MechanicalSystem:
 
     def _vectors(self, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, NDArray]:
         return tuple(checks.vector(name, given, len(self.names)) for name, given in (("q", q), ("v", v)))  # type: ignore[return-value]
+
+
+def _factors(matrix: Any) -> tuple[NDArray, Callable[[NDArray], NDArray]]:
+    """Pivots of a matrix, in size, and what solves with it."""
+    if sp.issparse(matrix):
+        try:
+            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A")
+        except RuntimeError:  # a pivot is zero exactly
+            return np.zeros(1), lambda right: np.full_like(right, np.nan)
+        return np.abs(factors.U.diagonal()), factors.solve
+    lu, exchanges, _ = dgetrf(matrix)
+    return np.abs(np.diag(lu)), lambda right: dgetrs(lu, exchanges, right)[0]
 
 
 def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
