@@ -62,7 +62,9 @@ def vector(name: str, value: ArrayLike, size: int) -> NDArray:
     """Return `value` as a finite float array (size,), else raise ValueError."""
     given = np.asarray(value, dtype=float)
     if given.shape != (size,) or not np.isfinite(given).all():
-        raise ValueError(f"{name} must be {size} finite numbers; got shape {given.shape}, {np.isfinite(given).sum()} of them finite")
+        raise ValueError(
+            f"{name} must be {size} finite numbers; got shape {given.shape}, {np.isfinite(given).sum()} of them finite"
+        )
     return given
 
 

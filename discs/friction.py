@@ -1,8 +1,8 @@
 r"""Whether the ground can hold the discs: the friction that a motion without sliding needs.
 
-The ground's force lambda on a disc lies in the plane. By Coulomb's law it holds while |lambda| <= mu N, N the normal force, here the
-disc's weight (with own gravity, ballast or magnets: whatever presses it down). The model has no weight of its own, so it is asked for.
-Discs stand upright by assumption, and no weight goes over from one to the next.
+The ground's force lambda on a disc lies in the plane. By Coulomb's law it holds while |lambda| <= mu N, N the force that presses
+the disc down. The model knows no gravity, so N is asked for. Discs stand upright by assumption: no load goes over from one to
+the next.
 
 lambda does no work: on the actual motion lambda.r. is what -e.lambda theta. takes.
 """

@@ -10,8 +10,9 @@ the second by differentiating the constraint. Both together are the saddle point
     [ M  A^T ] (  v.    )   (  f     )
     [ A   0  ] ( -lambda) = ( -A. v  ).
 
-For discs a constraint is r. - e theta. = 0, two rows for each disc: lambda is the ground's force, and -e.lambda its torque about the axle.
-M is diagonal and a disc's rows of A take its own velocities only, so the sparse matrix is as good as block diagonal and solved in O(n).
+For discs a constraint is r. - e theta. = 0, two rows for each disc: lambda is the ground's force, and -e.lambda its torque about
+the axle. M is diagonal and a disc's rows of A take its own velocities only, so the sparse matrix is as good as block diagonal and
+solved in O(n).
 
 The reduced form has no multipliers. With the columns of B spanning the kernel of A and some w with A w = -A. v,
 
@@ -34,8 +35,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, spsolve
 
 from discs import checks
-from discs.problem import Problem
-from discs.solution import Solution
 
 STEP = 1e-30  # of derivatives along the imaginary axis, which have no rounding: f(q + i h v) = f(q) + i h df/dq.v + O(h^2)
 SINGULAR = 1e-12  # pivots and ranks below this, relative to the largest, are looked into
@@ -64,7 +63,7 @@ class Trajectory:
 class MechanicalSystem:
     """A mechanical system with linear velocity constraints; m coordinates, c constraints.
 
-    Make one with `lagrange_dalembert` from discs, with `from_lagrangian` from formulas, or from its parts.
+    Make one with `discs.lagrange.lagrange_dalembert` from discs, with `from_lagrangian` from formulas, or from its parts.
 
     Attributes
     ----------
@@ -263,7 +262,8 @@ class MechanicalSystem:
         if off.max() > 1e-9 * max(np.abs(v).max(), np.abs(self.drive).max()):
             worst = int(np.argmax(off))
             raise ValueError(
-                f"v must obey the constraints; that of {self.owners[worst]} is off by {off[worst]:.3g}: take consistent_velocity(q, v)"
+                f"v must obey the constraints; that of {self.owners[worst]} is off by {off[worst]:.3g}: "
+                "take consistent_velocity(q, v)"
             )
         m = len(q)
 
@@ -298,79 +298,3 @@ def _factors(matrix: Any) -> tuple[NDArray, Callable[[NDArray], NDArray]]:
         return np.abs(factors.U.diagonal()), factors.solve
     lu, exchanges, _ = dgetrf(matrix)
     return np.abs(np.diag(lu)), lambda right: dgetrs(lu, exchanges, right)[0]
-
-
-def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
-    """The discs of a problem with all their coordinates and the ground's forces as unknowns.
-
-    Coordinates are those of all discs row by row, (x_0 ... x_{n-1}, y_0 ..., theta_0 ..., and phi_0 ... with own headings), so that
-    q.reshape(-1, n) has one row for each; multipliers.reshape(2, n) are the ground's forces (x, y). `frames` gives q and v of a
-    problem's start or of a run.
-
-    Symmetries are the motions of the plane (those that a shifted ring allows) and turning all discs of a piece alike, a piece
-    being discs that torsion springs join.
-    """
-    system, n = problem.system, problem.chain.n
-    rows, m = len(system.rows), len(system.rows) * n
-    discs = np.arange(n)
-    # row pairs r. - e theta.: entries 1 at x, y and -e at theta of the same disc
-    columns = np.stack([np.concatenate([discs, discs + n]), np.tile(discs + 2 * n, 2)], axis=1).ravel()
-    starts = np.arange(0, 4 * n + 1, 2)
-    inertia = sp.diags_array(system.weights.ravel(), format="csr")
-
-    def shape(q: NDArray) -> Any:
-        return system.shape(q.reshape(rows, n))
-
-    def entries(diagonal: float, e: NDArray) -> sp.csr_array:
-        data = np.stack([np.full(2 * n, diagonal), -e.ravel()], axis=1).ravel()
-        return sp.csr_array((data, columns, starts), shape=(2 * n, m))
-
-    moves, pieces = _moves(problem), _pieces(problem)
-
-    def symmetry(q: NDArray) -> NDArray:
-        generators = np.zeros((moves + len(pieces), rows, n))
-        generators[0, 0] = generators[1, 1] = 1
-        if moves == 3:
-            x, y = q.reshape(rows, n)[:2]
-            generators[2, :2] = -y, x
-            generators[2, 3:] = 1
-        generators[moves:, 2] = pieces
-        return generators.reshape(-1, m).T
-
-    return MechanicalSystem(
-        tuple(f"{row} of disc {i}" for row in system.rows for i in range(n)),
-        tuple(f"disc {i}" for i in range(n)) * 2,
-        lambda q: inertia,
-        lambda q: system.potential(shape(q)),
-        lambda q, v: -system.gradient(shape(q)).ravel(),
-        lambda q: entries(1.0, system.contact(shape(q))),
-        lambda q, v: entries(0.0, system.contact_rate(shape(q), v.reshape(rows, n))),
-        np.zeros(2 * n),
-        symmetry,
-    )
-
-
-def _moves(problem: Problem) -> int:
-    """Motions of the plane: two shifts, and a turn unless a ring closes up to a shift only."""
-    return 2 if np.any(problem.chain.shift) else 3
-
-
-def _pieces(problem: Problem) -> NDArray:
-    """Pieces of the chain that torsion springs join, (pieces, n), one or zero."""
-    n = problem.chain.n
-    first = np.flatnonzero(problem.chain.torsion_stiffness)
-    links = sp.coo_array((np.ones(first.size), (first, (first + 1) % n)), shape=(n, n))
-    count, piece = connected_components(links, directed=False)
-    return (piece == np.arange(count)[:, None]).astype(float)
-
-
-def frames(problem: Problem, run: Solution | None = None) -> tuple[NDArray, NDArray]:
-    """Coordinates and velocities of a run with want=("velocity",), (F, m); of the problem's start without a run, (m,)."""
-    system = problem.system
-    if run is None:
-        z = problem.start()
-        return z.hi.ravel(), system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi).ravel()
-    if run.x_rate is None:
-        raise ValueError('velocities are needed; simulate with want=("velocity",)')
-    rates = [run.omega if row == "theta" else getattr(run, f"{row}_rate") for row in system.rows]
-    return np.hstack([getattr(run, row) for row in system.rows]), np.hstack(rates)

@@ -5,22 +5,24 @@ turning discs that torsion springs join alike. For any xi, constant or not, p = 
 
     d/dt <p, xi_Q> = <A^T lambda, xi_Q> + <p, (d xi/dt)_Q>,
 
-because L does not change along xi_Q and the only other force is that of the ground. For constant xi this is the balance of momentum,
-of moment of momentum and of spin with the ground's forces (`symmetry_momenta`).
+because L does not change along xi_Q and the only other force is that of the ground. For constant xi this is the balance of
+momentum, of moment of momentum and of spin with the ground's forces (`symmetry_momenta`).
 
-The ground does no work on directions that obey the constraints, A xi_Q = 0. Those of them that are symmetries form the kernel g^q of
-A(q) X(q); for a section, xi(q) in g^q, the *nonholonomic momentum map* J = <p, xi_Q> obeys the *momentum equation* without lambda
+The ground does no work on directions that obey the constraints, A xi_Q = 0. Those of them that are symmetries form the kernel g^q
+of A(q) X(q); for a section, xi(q) in g^q, the *nonholonomic momentum map* J = <p, xi_Q> obeys the *momentum equation* without
+lambda
 
     dJ/dt = <p, (d xi/dt)_Q>.
 
-J is kept only where xi can be constant. Sections here are xi_j(q) = P(q) xi_j, P the projector to g^q along rows of N = A X and xi_j a
-basis of g^q at the start. With N+ the pseudo-inverse P = 1 - N+ N, and N P = 0 gives P. = -N+ N. P - (N+ N. P)^T while the rank of N stays.
+J is kept where xi is constant (the paper's NHnoether); elsewhere only if the right side happens to vanish, as it does for a single
+disc. Sections here are xi_j(q) = P(q) xi_j, P the orthogonal projector of g onto g^q and xi_j a basis of g^q at the start. With
+N = A X and its pseudo-inverse N+, P = 1 - N+ N, and N P = 0 gives P. = -N+ N. P - (N+ N. P)^T while the rank of N stays.
 
 Many discs leave no such direction: N discs have 2N constraints, and g has 3 + (pieces joined by torsion springs) dimensions. One
 disc has two, to roll and to turn; two discs without torsion between them one: both roll about the point where their axles meet.
 
 Source: A. M. Bloch, P. S. Krishnaprasad, J. E. Marsden, R. M. Murray, Nonholonomic mechanical systems with symmetry, Arch. Rational
-Mech. Anal. 136 (1996) 21-99, section 4; the paper's (NHnoether) is the case of a constant xi.
+Mech. Anal. 136 (1996) 21-99, section 4.
 """
 
 from dataclasses import dataclass
@@ -63,7 +65,7 @@ def symmetry_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: Ar
     ----------
     system : with a `symmetry`.
     t : (F,), times, at least 4.
-    q, v : (F, m), a motion: of `MechanicalSystem.integrate`, or of a run by `discs.mechanics.frames`.
+    q, v : (F, m), a motion: of `MechanicalSystem.integrate`, or of a run by `discs.lagrange.frames`.
 
     Returns
     -------
@@ -130,9 +132,7 @@ def _generators(system: MechanicalSystem, q: NDArray) -> NDArray:
     return system.symmetry(q)
 
 
-def _motion(
-    system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike
-) -> tuple[NDArray, list[tuple[NDArray, NDArray]]]:
+def _motion(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, list[tuple[NDArray, NDArray]]]:
     t, q, v = (np.asarray(given, dtype=float) for given in (t, q, v))
     shape = (t.size, len(system.names))
     if t.ndim != 1 or t.size < 4 or q.shape != shape or v.shape != shape:

@@ -2,8 +2,8 @@ r"""Systems of the nonholonomic literature with known answers, through the same 
 
 Each function returns a `Textbook`: a `discs.mechanics.MechanicalSystem`, an admissible start and, where there is a closed form, the
 motion with its multipliers. All derivations rest on one picture: motion with speed sigma along a direction of angle phi, r. = sigma
-(cos phi, sin phi), has r.. = sigma. (cos phi, sin phi) + sigma phi. (-sin phi, cos phi); the force of constraint gives the second part
-and the forces along the direction the first.
+(cos phi, sin phi), has r.. = sigma. (cos phi, sin phi) + sigma phi. (-sin phi, cos phi); the force of constraint gives the second
+part and the forces along the direction the first.
 
 * J. I. Neimark, N. A. Fufaev, Dynamics of Nonholonomic Systems, AMS 1972: knife edge, disc, sleigh;
 * A. M. Bloch, Nonholonomic Mechanics and Control, 2nd ed., Springer 2015, chapter 1: the same, and the particle;
@@ -13,6 +13,7 @@ and the forces along the direction the first.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,14 +77,15 @@ def rolling_disc(
 ) -> Textbook:
     r"""The vertical rolling disc, on a plane or an incline: x. = -R theta. sin phi, y. = R theta. cos phi.
 
-    Coordinates (x, y, theta, phi), phi the direction of the axle; gravity pulls with mass times `slope` (g sin of the incline's angle)
-    along x. The heading turns uniformly, phi = phi_0 + Omega t, since the disc's weight has no moment about the vertical, and
+    Coordinates (x, y, theta, phi), phi the direction of the axle; gravity pulls with mass times `slope` (g sin of the incline's
+    angle) along x. The heading turns uniformly, phi = phi_0 + Omega t, since the disc's weight has no moment about the vertical,
+    and
 
         (alpha + m R^2) theta.. = -m R slope sin phi:   theta. = b + c cos phi,   c = m R slope/((alpha + m R^2) Omega).
 
-    The contact moves with speed R theta. along phi + pi/2: on a plane on a circle of radius R omega/Omega; on an incline in cycloids
-    that drift sideways, R c/2 on average, and never down. The ground's force is
-    lambda = m R (theta.. (-sin phi, cos phi) - Omega theta. (cos phi, sin phi)) - (m slope, 0).
+    The contact moves with speed R theta. along phi + pi/2: on a plane on a circle of radius R omega/Omega; on an incline in
+    cycloids that drift sideways, R c/2 on average, and never down. The ground's force is lambda = m R (theta.. (-sin phi, cos
+    phi) - Omega theta. (cos phi, sin phi)) - (m slope, 0).
 
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.4. `turn_rate` must not be 0.
     """
@@ -124,13 +126,12 @@ def rolling_disc(
     return Textbook(system, q, v, exact, {"turning": lambda q, v: float(v[3])})
 
 
-def knife_edge(
-    mass: float, inertia: float, *, slope: float, speed: float, turn_rate: float, heading: float = 0.0
-) -> Textbook:
+def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_rate: float, heading: float = 0.0) -> Textbook:
     r"""A knife edge (a skate) on an incline: x. sin phi = y. cos phi.
 
-    Coordinates (x, y, phi), gravity along x with mass times `slope`. The blade turns uniformly, its speed u obeys u. = slope cos phi, so
-    u = b + c sin phi, c = slope/Omega; lambda = m u Omega + m slope sin phi across the blade, (-sin phi, cos phi). From rest at phi = 0
+    Coordinates (x, y, phi), gravity along x with mass times `slope`. The blade turns uniformly, its speed u obeys u. = slope cos
+    phi, so u = b + c sin phi, c = slope/Omega; lambda = m u Omega + m slope sin phi across the blade, (-sin phi, cos phi). From
+    rest at phi = 0
 
         x = slope/(2 Omega^2) sin^2 Omega t,   y = slope/(2 Omega^2) (Omega t - sin(2 Omega t)/2):
 
@@ -168,8 +169,8 @@ def chaplygin_sleigh(
 ) -> Textbook:
     r"""The Chaplygin sleigh: a knife edge at (x, y), the centre of mass a distance a = `offset` ahead of it.
 
-    In the coordinates (x, y, phi) of the edge M depends on phi: T = m/2 |(x., y.) + a phi. (-sin phi, cos phi)|^2 + I/2 phi.^2. With
-    the speed u of the edge and J = I + m a^2
+    In the coordinates (x, y, phi) of the edge M depends on phi: T = m/2 |(x., y.) + a phi. (-sin phi, cos phi)|^2 + I/2 phi.^2.
+    With the speed u of the edge and J = I + m a^2
 
         u. = a phi.^2,   J phi.. = -m a u phi.,   so  u^2 + J phi.^2/m = U^2  and, with tau = kappa (t - t_0), kappa = a m U/J,
 
@@ -254,13 +255,21 @@ def nonholonomic_particle(mass: float, width: float, *, y: float, velocity: tupl
 
 
 def contact_oscillator(
-    mass: float, stiffness: float, driver_mass: float, driver_stiffness: float, width: float, *, q: ArrayLike, speed: float, drift: float
+    mass: float,
+    stiffness: float,
+    driver_mass: float,
+    driver_stiffness: float,
+    width: float,
+    *,
+    q: ArrayLike,
+    speed: float,
+    drift: float,
 ) -> Textbook:
     r"""The contact oscillator: x. + (y/b) z. = 0, V = (K (x^2 + z^2) + k y^2)/2; b = `width`, k = `driver_stiffness`.
 
     The constraint's force has no part in y, which oscillates by itself, and drives the others: (x, z) move with speed sigma along
-    (-sin chi, cos chi), tan chi = y/b, where m sigma. = K (x sin chi - z cos chi). So (x, z, sigma sqrt(m/K)) turns on a sphere, and
-    both energies are kept. `speed` is sigma and `drift` is y. at the start, q = (x, y, z).
+    (-sin chi, cos chi), tan chi = y/b, where m sigma. = K (x sin chi - z cos chi). So (x, z, sigma sqrt(m/K)) turns on a sphere,
+    and both energies are kept. `speed` is sigma and `drift` is y. at the start, q = (x, y, z).
 
     A motion with y through t_0 at rest is the same before and after: reversible, as all usual test problems are; see
     `driven_oscillator` for one that is not.
@@ -284,9 +293,10 @@ def driven_oscillator(
 ) -> Textbook:
     r"""A continuously variable transmission that is not reversible: x. + sin(y) z. = 0, U(y) = wave (cos y + skew sin(2y)/2).
 
-    As `contact_oscillator`, but the driver is a pendulum that goes round: without a turning point, it is the same before and after some
-    moment only if U is even about some place. skew = 0 is the reversible one; any other is integrable still, driver and
-    oscillator keep an energy each, but not reversible, and methods that owe their long-time behaviour to reversibility fail on it.
+    As `contact_oscillator`, but the driver is a pendulum that goes round: without a turning point, it is the same before and
+    after some moment only if U is even about some place. skew = 0 is the reversible one; any other is integrable still, driver
+    and oscillator keep an energy each, but not reversible, and methods that owe their long-time behaviour to reversibility fail
+    on it.
 
     Source: of the kind that Modin and Verdier (2020) construct by perturbing the pendulum-driven transmission; parameters are ours.
     Raises ValueError unless the driver goes round.
@@ -308,7 +318,7 @@ def _driven(
     names: tuple[str, ...],
     parameters: tuple[float, float, float],
     hill: Callable[[NDArray], NDArray],
-    gear: Callable[[NDArray], NDArray],
+    gear: Callable[[NDArray], Any],
     q: ArrayLike,
     speed: float,
     drift: float,

@@ -57,9 +57,7 @@ def test_the_ground_does_no_work(name, model):
 def free_discs(duration=2.0):
     """Two discs without springs between them: each runs in a circle, |lambda| = m R |omega Omega|."""
     loose = dict.fromkeys(("stretch_stiffness", "shear_stiffness", "torsion_stiffness", "bending_stiffness"), 0.0)
-    chain = SteeredChain(
-        n=2, length=3.0, density=[1.3, 0.9], spin_inertia=0.6, heading_inertia=0.3, radius=[0.7, 0.5], **loose
-    )
+    chain = SteeredChain(n=2, length=3.0, density=[1.3, 0.9], spin_inertia=0.6, heading_inertia=0.3, radius=[0.7, 0.5], **loose)
     zero = np.zeros(2)
     return Problem(chain, State(chain.s, zero, zero, [1.1, -0.4], zero + 0.3, [0.8, 1.9]), duration)
 
@@ -101,7 +99,7 @@ def test_first_slip(model):
 
 
 def test_between_two_frames_the_earliest_disc_counts():
-    """|lambda| = t, of weight 1, and 1.75 t, of weight 2, on mu = 0.3: disc 0 at t = 0.3, disc 1 at 0.34; it would take 2 at the next frame."""
+    """|lambda| = t, of weight 1, and 1.75 t, of weight 2, on mu = 0.3: disc 0 at t = 0.3, disc 1 at 0.34."""
     run = simulate(free_discs(), dt=0.1, frames=[0.0, 2.0], want=("contact_force",), progress=False)
     force = np.zeros((2, 2, 2))
     force[:, 0, 0], force[:, 1, 1] = [0.0, 2.0], [0.0, -3.5]
@@ -115,7 +113,7 @@ def test_bad_input_is_refused():
     with pytest.raises(ValueError, match=r'ground forces are needed; simulate with want=\("contact_force",\)'):
         friction_needed(run, 1.0)
     run = simulate(problem, frames=2, want=("contact_force",), progress=False)
-    with pytest.raises(ValueError, match="weight must be finite and greater than 0; got 0.0 at place 1"):
+    with pytest.raises(ValueError, match=r"weight must be finite and greater than 0; got 0.0 at place 1"):
         friction_needed(run, [1.0, 0.0])
-    with pytest.raises(ValueError, match="mu must be finite and greater than 0; got -0.3 at place 0"):
+    with pytest.raises(ValueError, match=r"mu must be finite and greater than 0; got -0.3 at place 0"):
         first_slip(run, 1.0, -0.3)

@@ -8,7 +8,8 @@ import scipy.linalg as la
 from scipy.sparse.csgraph import connected_components
 
 from discs import Gauss8, Problem, State, SteeredChain, simulate
-from discs.mechanics import MechanicalSystem, frames, lagrange_dalembert
+from discs.lagrange import frames, lagrange_dalembert
+from discs.mechanics import MechanicalSystem
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 from tests.discs.test_system import contact_from_the_definition, directional, potential_from_the_definition
 
@@ -171,7 +172,7 @@ def test_redundant_and_contradicting_constraints_name_their_disc():
     problem = uneven(N, SLAVED[0])
     free, (q, v) = lagrange_dalembert(problem), frames(problem)
     held = free.also([row(free, "x of disc 3"), row(free, "y of disc 3")], ["disc 3"] * 2)
-    with pytest.raises(ValueError, match="constraints of disc 3 are redundant: 4 rows of rank 3.*take 1 away"):
+    with pytest.raises(ValueError, match=r"constraints of disc 3 are redundant: 4 rows of rank 3.*take 1 away"):
         held.consistent_velocity(q, v)
     pulled = free.also([row(free, "x of disc 3"), row(free, "y of disc 3")], ["disc 3", "the winch"], [0.3, 0.9])
     with pytest.raises(ValueError, match="constraints of disc 3, the winch contradict each other: no motion obeys all 4"):
@@ -215,7 +216,7 @@ def test_bad_input_is_refused():
     system, (q, v) = lagrange_dalembert(problem), frames(problem)
     with pytest.raises(ValueError, match=r"v must be 27 finite numbers; got shape \(3,\)"):
         system.accelerations(q, [1, 2, 3])
-    with pytest.raises(ValueError, match="that of disc 4 is off by 0.5: take consistent_velocity"):
+    with pytest.raises(ValueError, match=r"that of disc 4 is off by 0.5: take consistent_velocity"):
         system.integrate(q, v + 0.5 * row(system, "y of disc 4"), [0, 1])
     with pytest.raises(ValueError, match="times must be at least two, increasing"):
         system.integrate(q, v, [0, 0])

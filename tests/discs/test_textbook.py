@@ -152,7 +152,7 @@ def test_which_driver_is_reversible(skew, even):
 def test_bad_parameters_are_refused():
     with pytest.raises(ValueError, match=r"turn_rate must not be 0 \(the disc then rolls on a straight line\); got 0"):
         textbook.rolling_disc(**DISC, roll_rate=1.0, turn_rate=0)
-    with pytest.raises(ValueError, match="radius must be a positive finite number; got -0.7"):
+    with pytest.raises(ValueError, match=r"radius must be a positive finite number; got -0.7"):
         textbook.rolling_disc(**DISC | {"radius": -0.7}, roll_rate=1.0, turn_rate=1.0)
     with pytest.raises(ValueError, match="turn_rate must not be 0"):
         textbook.knife_edge(1.0, 1.0, slope=1.0, speed=1.0, turn_rate=0.0)
@@ -160,7 +160,7 @@ def test_bad_parameters_are_refused():
         textbook.chaplygin_sleigh(1.0, 1.0, 0.0, speed=1.0, turn_rate=1.0)
     with pytest.raises(ValueError, match=r"velocity\[1\] must not be 0"):
         textbook.nonholonomic_particle(1.0, 1.0, y=0.0, velocity=(1.0, 0.0))
-    with pytest.raises(ValueError, match="drift must be above 0.*in size for the driver to go round; got 0.1"):
+    with pytest.raises(ValueError, match=r"drift must be above 0.*in size for the driver to go round; got 0.1"):
         textbook.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, **START, drift=0.1)
     with pytest.raises(ValueError, match="q must be 3 finite numbers"):
         textbook.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, q=(1, 2), speed=1.0, drift=3.0)
