@@ -99,12 +99,13 @@ def test_first_slip(model):
 
 
 def test_between_two_frames_the_earliest_disc_counts():
-    """|lambda| = t, of weight 1, and 1.75 t, of weight 2, on mu = 0.3: disc 0 at t = 0.3, disc 1 at 0.34."""
+    """|lambda| = 1.75 t, of weight 2, and t, of weight 1, on mu = 0.3: disc 0 at t = 0.34, disc 1 at 0.3."""
     run = simulate(free_discs(), dt=0.1, frames=[0.0, 2.0], want=("contact_force",), progress=False)
     force = np.zeros((2, 2, 2))
-    force[:, 0, 0], force[:, 1, 1] = [0.0, 2.0], [0.0, -3.5]
-    slip = first_slip(replace(run, contact_force=force), [1.0, 2.0], 0.3)
-    assert (slip.disc, slip.time, slip.needed) == (0, pytest.approx(0.3), 2.0)
+    force[:, 0, 0], force[:, 1, 1] = [0.0, -3.5], [0.0, 2.0]
+    slip = first_slip(replace(run, contact_force=force), [2.0, 1.0], 0.3)
+    assert (slip.disc, slip.time, slip.needed) == (1, pytest.approx(0.3), 2.0)
+    assert first_slip(replace(run, contact_force=force), [1.5, 1.0], 0.3).disc == 0
 
 
 def test_bad_input_is_refused():
