@@ -42,9 +42,9 @@ def test_order_of_the_ground_force(name, model):
 def test_the_ground_does_no_work(name, model):
     """lambda.r. - (e.lambda) theta. = 0 of each disc at each frame, with e from its definition."""
     problem = uneven(6, model)
-    run = simulate(problem, name, 0.004, np.linspace(0, 0.1, 7), ("contact_force", "velocity"), progress=False)
-    assert run.contact_force.shape == (7, 2, 6)
-    for f in range(7):
+    run = simulate(problem, name, 0.004, np.linspace(0, 0.03, 4), ("contact_force", "velocity"), progress=False)
+    assert run.contact_force.shape == (4, 2, 6)
+    for f in range(4):
         q = np.stack([getattr(run, row)[f] for row in problem.system.rows])
         e, ground = contact_from_the_definition(problem, q), run.contact_force[f]
         power = (ground * [run.x_rate[f], run.y_rate[f]]).sum(axis=0) - (e * ground).sum(axis=0) * run.omega[f]
