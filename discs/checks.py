@@ -58,6 +58,16 @@ def field(name: str, value: ArrayLike, size: int, *, least: float | None = None,
     return given
 
 
+def vector(name: str, value: ArrayLike, size: int) -> NDArray:
+    """Return `value` as a finite float array (size,), else raise ValueError."""
+    given = np.asarray(value, dtype=float)
+    if given.shape != (size,) or not np.isfinite(given).all():
+        raise ValueError(
+            f"{name} must be {size} finite numbers; got shape {given.shape}, {np.isfinite(given).sum()} of them finite"
+        )
+    return given
+
+
 def iteration(sweeps: object, tolerance: object) -> None:
     """Check the limits of an iteration: at least one sweep, a tolerance that is not negative."""
     whole("sweeps", sweeps, 1)

@@ -1,0 +1,88 @@
+"""Discs as a mechanical system with all coordinates and the ground's forces as unknowns."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from discs.mechanics import MechanicalSystem
+from discs.problem import Problem
+from discs.solution import Solution
+
+
+def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
+    """Lagrange-d'Alembert for the discs of a problem, A the rows r. - e theta. and lambda the ground's forces.
+
+    Coordinates are those of all discs row by row, (x_0 ... x_{n-1}, y_0 ..., theta_0 ..., and phi_0 ... with own headings), so that
+    q.reshape(-1, n) has one row for each; multipliers.reshape(2, n) are the ground's forces (x, y). `frames` gives q and v of a
+    problem's start or of a run.
+
+    Symmetries are the motions of the plane (those that a shifted ring allows) and turning all discs of a piece alike, a piece
+    being discs that torsion springs join.
+    """
+    system, n = problem.system, problem.chain.n
+    rows, m = len(system.rows), len(system.rows) * n
+    discs = np.arange(n)
+    # row pairs r. - e theta.: entries 1 at x, y and -e at theta of the same disc
+    columns = np.stack([np.concatenate([discs, discs + n]), np.tile(discs + 2 * n, 2)], axis=1).ravel()
+    starts = np.arange(0, 4 * n + 1, 2)
+    inertia = sp.diags_array(system.weights.ravel(), format="csr")
+
+    def shape(q: NDArray) -> Any:
+        return system.shape(q.reshape(rows, n))
+
+    def entries(diagonal: float, e: NDArray) -> sp.csr_array:
+        data = np.stack([np.full(2 * n, diagonal), -e.ravel()], axis=1).ravel()
+        return sp.csr_array((data, columns, starts), shape=(2 * n, m))
+
+    moves, pieces = _moves(problem), _pieces(problem)
+
+    def symmetry(q: NDArray) -> NDArray:
+        generators = np.zeros((moves + len(pieces), rows, n))
+        generators[0, 0] = generators[1, 1] = 1
+        if moves == 3:
+            x, y = q.reshape(rows, n)[:2]
+            generators[2, :2] = -y, x
+            generators[2, 3:] = 1
+        generators[moves:, 2] = pieces
+        return generators.reshape(-1, m).T
+
+    return MechanicalSystem(
+        tuple(f"{row} of disc {i}" for row in system.rows for i in range(n)),
+        tuple(f"disc {i}" for i in range(n)) * 2,
+        lambda q: inertia,
+        lambda q: system.potential(shape(q)),
+        lambda q, v: -system.gradient(shape(q)).ravel(),
+        lambda q: entries(1.0, system.contact(shape(q))),
+        lambda q, v: entries(0.0, system.contact_rate(shape(q), v.reshape(rows, n))),
+        np.zeros(2 * n),
+        symmetry,
+    )
+
+
+def _moves(problem: Problem) -> int:
+    """Motions of the plane: two shifts, and a turn unless a ring closes up to a shift only."""
+    return 2 if np.any(problem.chain.shift) else 3
+
+
+def _pieces(problem: Problem) -> NDArray:
+    """Pieces of the chain that torsion springs join, (pieces, n), one or zero."""
+    n = problem.chain.n
+    first = np.flatnonzero(problem.chain.torsion_stiffness)
+    links = sp.coo_array((np.ones(first.size), (first, (first + 1) % n)), shape=(n, n))
+    count, piece = connected_components(links, directed=False)
+    return (piece == np.arange(count)[:, None]).astype(float)
+
+
+def frames(problem: Problem, run: Solution | None = None) -> tuple[NDArray, NDArray]:
+    """Coordinates and velocities of a run with want=("velocity",), (F, m); of the problem's start without a run, (m,)."""
+    system = problem.system
+    if run is None:
+        z = problem.start()
+        return z.hi.ravel(), system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi).ravel()
+    if run.x_rate is None:
+        raise ValueError('velocities are needed; simulate with want=("velocity",)')
+    rates = [run.omega if row == "theta" else getattr(run, f"{row}_rate") for row in system.rows]
+    return np.hstack([getattr(run, row) for row in system.rows]), np.hstack(rates)

@@ -1,0 +1,300 @@
+r"""Lagrange-d'Alembert with its multipliers, as textbooks write it.
+
+A mechanical system with L = v.M(q)v/2 - V(q), v = q., moves under linear constraints A(q) v = b (b constant: zero for rolling). The
+forces that keep them do no work on virtual displacements, those with A dq = 0; so they are A^T lambda, and
+
+    M v. = f + A^T lambda,   f = dL/dq - M. v,   A v. = -A. v,
+
+the second by differentiating the constraint. Both together are the saddle point
+
+    [ M  A^T ] (  v.    )   (  f     )
+    [ A   0  ] ( -lambda) = ( -A. v  ).
+
+For discs a constraint is r. - e theta. = 0, two rows for each disc: lambda is the ground's force, and -e.lambda its torque about
+the axle. M is diagonal and a disc's rows of A take its own velocities only, so the sparse matrix is as good as block diagonal and
+solved in O(n).
+
+The reduced form has no multipliers. With the columns of B spanning the kernel of A and some w with A w = -A. v,
+
+    v. = w + B u,   B^T M B u = B^T (f - M w),   lambda = (A A^T)^{-1} A (M v. - f).
+
+The skew-gradient form of `discs.system` takes the B with B^T M B = 1. The three are one system of equations.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
+from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu, spsolve
+
+from discs import checks
+
+STEP = 1e-30  # of derivatives along the imaginary axis, which have no rounding: f(q + i h v) = f(q) + i h df/dq.v + O(h^2)
+SINGULAR = 1e-12  # pivots and ranks below this, relative to the largest, are looked into
+
+
+class Motion(NamedTuple):
+    """Accelerations (m,) and multipliers lambda (c,), the forces of constraint being A^T lambda."""
+
+    acceleration: NDArray
+    multipliers: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,)."""
+
+    t: NDArray
+    q: NDArray
+    v: NDArray
+    multipliers: NDArray
+    energy: NDArray
+    residual: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class MechanicalSystem:
+    """A mechanical system with linear velocity constraints; m coordinates, c constraints.
+
+    Make one with `discs.lagrange.lagrange_dalembert` from discs, with `from_lagrangian` from formulas, or from its parts.
+
+    Attributes
+    ----------
+    names : (m,), what the coordinates are.
+    owners : (c,), whose constraint each row of A is, as "disc 3".
+    mass : q -> M, (m, m), an array or a sparse one; positive definite on the kernel of A.
+    potential : q -> V.
+    force : q, v -> f, (m,).
+    constraint : q -> A, (c, m).
+    constraint_rate : q, v -> A. = dA/dq.v, (c, m).
+    drive : b, (c,).
+    symmetry : q -> X, (m, g): velocities of g one-parameter groups that leave L as it is, affine in q; None if none are known.
+    """
+
+    names: tuple[str, ...]
+    owners: tuple[str, ...]
+    mass: Callable[[NDArray], Any]
+    potential: Callable[[NDArray], float]
+    force: Callable[[NDArray, NDArray], NDArray]
+    constraint: Callable[[NDArray], Any]
+    constraint_rate: Callable[[NDArray, NDArray], Any]
+    drive: NDArray
+    symmetry: Callable[[NDArray], NDArray] | None = None
+
+    @classmethod
+    def from_lagrangian(
+        cls,
+        names: Sequence[str],
+        mass: Callable[[NDArray], ArrayLike] | ArrayLike,
+        potential: Callable[[NDArray], Any],
+        constraint: Callable[[NDArray], ArrayLike],
+        owners: Sequence[str],
+        drive: ArrayLike = 0.0,
+        symmetry: Callable[[NDArray], ArrayLike] | None = None,
+    ) -> "MechanicalSystem":
+        """A system from M (or M(q)), V(q) and A(q), formulas in NumPy that also take complex numbers (no abs, no hypot).
+
+        Derivatives are taken along the imaginary axis, exact to rounding.
+        """
+
+        def m(q: NDArray) -> NDArray:
+            return np.asarray(mass(q) if callable(mass) else mass)
+
+        def along(f: Callable[[NDArray], Any], q: NDArray, v: NDArray) -> NDArray:
+            return np.imag(f(q + 1j * STEP * v)) / STEP
+
+        def force(q: NDArray, v: NDArray) -> NDArray:
+            gradient = [along(lambda z: 0.5 * v @ m(z) @ v - potential(z), q, unit) for unit in np.eye(len(q))]
+            return np.array(gradient) - along(m, q, v) @ v
+
+        def a(q: NDArray) -> NDArray:
+            return np.atleast_2d(np.asarray(constraint(q)))
+
+        shape = (len(tuple(owners)), len(tuple(names)))
+        given = a(np.zeros(shape[1])).shape, m(np.zeros(shape[1])).shape
+        if given != (shape, (shape[1], shape[1])):
+            raise ValueError(
+                f"A must be of shape {shape} and M of shape {shape[1:] * 2}, for {shape[1]} names and {shape[0]} owners; "
+                f"got {given[0]} and {given[1]}"
+            )
+        return cls(
+            tuple(names),
+            tuple(owners),
+            m,
+            lambda q: float(potential(q)),
+            force,
+            a,
+            lambda q, v: along(a, q, v),
+            checks.field("drive", drive, len(owners)),
+            None if symmetry is None else lambda q: np.asarray(symmetry(q), dtype=float),
+        )
+
+    def also(self, rows: ArrayLike, owners: Sequence[str], drive: ArrayLike = 0.0) -> "MechanicalSystem":
+        """The system with more constraints, constant rows (k, m) with rows @ v = drive: a disc that is held, a motor."""
+        extra = sp.csr_array(np.atleast_2d(np.asarray(rows, dtype=float)))
+        if extra.shape != (len(owners), len(self.names)):
+            raise ValueError(f"rows must have shape ({len(owners)}, {len(self.names)}), one row per owner; got {extra.shape}")
+        none = sp.csr_array(extra.shape)
+        return replace(
+            self,
+            owners=(*self.owners, *owners),
+            constraint=lambda q: sp.vstack([sp.csr_array(self.constraint(q)), extra], format="csr"),
+            constraint_rate=lambda q, v: sp.vstack([sp.csr_array(self.constraint_rate(q, v)), none], format="csr"),
+            drive=np.concatenate([self.drive, checks.field("drive", drive, len(owners))]),
+        )
+
+    # The equations
+
+    def saddle_point(self, q: NDArray) -> Any:
+        """The matrix [[M, A^T], [A, 0]], (m + c, m + c), sparse if A is."""
+        m, a = self.mass(q), self.constraint(q)
+        if not sp.issparse(a):
+            return np.block([[m, a.T], [a, np.zeros((len(a), len(a)))]])
+        m, a = sp.coo_array(m), sp.coo_array(a)
+        row, column = a.coords[0] + m.shape[0], a.coords[1]
+        places = np.concatenate([m.coords[0], row, column]), np.concatenate([m.coords[1], column, row])
+        size = m.shape[0] + a.shape[0]
+        return sp.csc_array(sp.coo_array((np.concatenate([m.data, a.data, a.data]), places), shape=(size, size)))
+
+    def _solve(self, q: NDArray, f: NDArray, g: NDArray) -> Motion:
+        """u and lambda with M u = f + A^T lambda, A u = g."""
+        pivots, solve = _factors(self.saddle_point(q))
+        if not pivots.min() > SINGULAR * pivots.max():
+            self._explain(q, g)
+        unknowns = solve(np.concatenate([f, g]))
+        return Motion(unknowns[: len(f)], -unknowns[len(f) :])
+
+    def _explain(self, q: NDArray, g: NDArray) -> None:
+        """Raise ValueError with what makes the saddle point singular, part by part of constraints that share coordinates."""
+        a = sp.csr_array(self.constraint(q))
+        parts, part = connected_components(abs(a) @ abs(a).T, directed=False)
+        for p in range(parts):
+            rows = np.flatnonzero(part == p)
+            block = a[rows].toarray()
+            block, right = block[:, np.any(block != 0, axis=0)], g[rows]
+            rank = int(np.linalg.matrix_rank(block, rtol=SINGULAR)) if block.size else 0
+            if rank == len(rows):
+                continue
+            owners = ", ".join(dict.fromkeys(self.owners[i] for i in rows))
+            least = np.linalg.lstsq(block, right)[0] if block.size else np.zeros(0)
+            if np.abs(block @ least - right).max() > 1e-9 * max(np.abs(right).max(), 1e-300):
+                raise ValueError(f"constraints of {owners} contradict each other: no motion obeys all {len(rows)}; take one away")
+            raise ValueError(
+                f"constraints of {owners} are redundant: {len(rows)} rows of rank {rank}, so that multipliers are not determined; "
+                f"take {len(rows) - rank} away"
+            )
+        kernel = la.null_space(a.toarray())
+        inertia = kernel.T @ (self.mass(q) @ kernel)
+        sizes, directions = np.linalg.eigh(inertia)
+        if sizes[0] <= SINGULAR * sizes[-1]:
+            worst = self.names[int(np.argmax(np.abs(kernel @ directions[:, 0])))]
+            raise ValueError(f"M must be positive on velocities that the constraints allow; there is no inertia against {worst}")
+
+    def accelerations(self, q: ArrayLike, v: ArrayLike) -> Motion:
+        """Accelerations and multipliers from the saddle point, sparse.
+
+        Parameters
+        ----------
+        q, v : (m,), coordinates and velocities; v obeys the constraints.
+
+        Raises
+        ------
+        ValueError : if constraints are redundant or contradict each other, naming their owners, or inertia is missing.
+        """
+        q, v = self._vectors(q, v)
+        return self._solve(q, self.force(q, v), -(self.constraint_rate(q, v) @ v))
+
+    def consistent_velocity(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+        """The velocity u nearest to v that the constraints allow: A u = b and (u - v).M(u - v) least, (m,).
+
+        So M (u - v) = A^T mu: it is what an impulse of the constraints' own forces makes of v.
+        """
+        q, v = self._vectors(q, v)
+        return self._solve(q, self.mass(q) @ v, self.drive).acceleration
+
+    def reduced(self, q: ArrayLike, v: ArrayLike) -> Motion:
+        """The same accelerations and multipliers from the reduced form, dense: for small systems and for teaching."""
+        q, v = self._vectors(q, v)
+        m, a, f = self.mass(q), sp.csc_array(self.constraint(q)), self.force(q, v)
+        square = sp.csc_array(a @ a.T)
+        w = a.T @ spsolve(square, -(self.constraint_rate(q, v) @ v))
+        b = la.null_space(a.toarray())
+        u = np.linalg.solve(b.T @ (m @ b), b.T @ (f - m @ w))
+        acceleration = w + b @ u
+        return Motion(acceleration, np.atleast_1d(spsolve(square, a @ (m @ acceleration - f))))
+
+    def residual(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+        """A v - b, (c,)."""
+        q, v = self._vectors(q, v)
+        return self.constraint(q) @ v - self.drive
+
+    def momentum(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+        """p = M v, (m,)."""
+        q, v = self._vectors(q, v)
+        return self.mass(q) @ v
+
+    def energy(self, q: ArrayLike, v: ArrayLike) -> float:
+        """v.Mv/2 + V; constant if b = 0."""
+        q, v = self._vectors(q, v)
+        return 0.5 * float(v @ (self.mass(q) @ v)) + self.potential(q)
+
+    def integrate(self, q: ArrayLike, v: ArrayLike, times: ArrayLike, rtol: float = 1e-11) -> Trajectory:
+        """The motion from q, v at times[0], by SciPy's DOP853 on v. from the saddle point; for small systems.
+
+        Nothing pulls the velocity back to the constraint: `residual` shows how well the equations alone keep it.
+
+        Raises
+        ------
+        ValueError : if v does not obey the constraints, naming the worst owner.
+        """
+        q, v = self._vectors(q, v)
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
+            raise ValueError("times must be at least two, increasing, the first that of q and v")
+        off = np.abs(self.residual(q, v))
+        if off.max() > 1e-9 * max(np.abs(v).max(), np.abs(self.drive).max()):
+            worst = int(np.argmax(off))
+            raise ValueError(
+                f"v must obey the constraints; that of {self.owners[worst]} is off by {off[worst]:.3g}: "
+                "take consistent_velocity(q, v)"
+            )
+        m = len(q)
+
+        def rate(_: float, z: NDArray) -> NDArray:
+            return np.concatenate([z[m:], self.accelerations(z[:m], z[m:]).acceleration])
+
+        found = solve_ivp(rate, (t[0], t[-1]), np.concatenate([q, v]), "DOP853", t, rtol=rtol, atol=1e-3 * rtol)
+        if not found.success:
+            raise ValueError(f"the motion could not be followed beyond t = {found.t[-1]:g}: {found.message}")
+        path, speed = found.y[:m].T, found.y[m:].T
+        frames = list(zip(path, speed, strict=True))
+        return Trajectory(
+            t,
+            path,
+            speed,
+            np.array([self.accelerations(*z).multipliers for z in frames]),
+            np.array([self.energy(*z) for z in frames]),
+            np.array([np.abs(self.residual(*z)).max() for z in frames]),
+        )
+
+    def _vectors(self, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, NDArray]:
+        return tuple(checks.vector(name, given, len(self.names)) for name, given in (("q", q), ("v", v)))  # type: ignore[return-value]
+
+
+def _factors(matrix: Any) -> tuple[NDArray, Callable[[NDArray], NDArray]]:
+    """Pivots of a matrix, in size, and what solves with it."""
+    if sp.issparse(matrix):
+        try:
+            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A")
+        except RuntimeError:  # a pivot is zero exactly
+            return np.zeros(1), lambda right: np.full_like(right, np.nan)
+        return np.abs(factors.U.diagonal()), factors.solve
+    lu, exchanges, _ = dgetrf(matrix)
+    return np.abs(np.diag(lu)), lambda right: dgetrs(lu, exchanges, right)[0]

@@ -1,0 +1,142 @@
+r"""Symmetry and momentum: what the rolling constraint leaves of Noether's theorem.
+
+Let the velocities xi_Q(q) = X(q) xi, xi in a vector space g, be those of a group that leaves L as it is: motions of the plane, and
+turning discs that torsion springs join alike. For any xi, constant or not, p = M v has
+
+    d/dt <p, xi_Q> = <A^T lambda, xi_Q> + <p, (d xi/dt)_Q>,
+
+because L does not change along xi_Q and the only other force is that of the ground. For constant xi this is the balance of
+momentum, of moment of momentum and of spin with the ground's forces (`symmetry_momenta`).
+
+The ground does no work on directions that obey the constraints, A xi_Q = 0. Those of them that are symmetries form the kernel g^q
+of A(q) X(q); for a section, xi(q) in g^q, the *nonholonomic momentum map* J = <p, xi_Q> obeys the *momentum equation* without
+lambda
+
+    dJ/dt = <p, (d xi/dt)_Q>.
+
+J is kept where xi is constant (the paper's NHnoether); elsewhere only if the right side happens to vanish, as it does for a single
+disc. Sections here are xi_j(q) = P(q) xi_j, P the orthogonal projector of g onto g^q and xi_j a basis of g^q at the start. With
+N = A X and its pseudo-inverse N+, P = 1 - N+ N, and N P = 0 gives P. = -N+ N. P - (N+ N. P)^T while the rank of N stays.
+
+Many discs leave no such direction: N discs have 2N constraints, and g has 3 + (pieces joined by torsion springs) dimensions. One
+disc has two, to roll and to turn; two discs without torsion between them one: both roll about the point where their axles meet.
+
+Source: A. M. Bloch, P. S. Krishnaprasad, J. E. Marsden, R. M. Murray, Nonholonomic mechanical systems with symmetry, Arch. Rational
+Mech. Anal. 136 (1996) 21-99, section 4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from discs.mechanics import MechanicalSystem
+
+RANK = 1e-9  # of N, relative to its largest singular value
+
+
+@dataclass(frozen=True, eq=False)
+class Momenta:
+    """Momenta along a motion, at F times.
+
+    Attributes
+    ----------
+    t : (F,).
+    value : (F, k), <p, xi_Q>.
+    rate : (F, k), d/dt of it by the momentum equation.
+    section : (F, k, g), xi in the basis of `MechanicalSystem.symmetry`.
+    """
+
+    t: NDArray
+    value: NDArray
+    rate: NDArray
+    section: NDArray
+
+    def residual(self) -> NDArray:
+        """value(t) - value(0) - integral of rate, (F, k): zero but for the method's error and that of a cubic spline in t."""
+        return self.value - self.value[0] - CubicSpline(self.t, self.rate).antiderivative()(self.t)
+
+
+def symmetry_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> Momenta:
+    """Momenta of all known symmetries and what the ground's forces make of them, d/dt <p, xi_Q> = <A^T lambda, xi_Q>.
+
+    Parameters
+    ----------
+    system : with a `symmetry`.
+    t : (F,), times, at least 4.
+    q, v : (F, m), a motion: of `MechanicalSystem.integrate`, or of a run by `discs.lagrange.frames`.
+
+    Returns
+    -------
+    Momenta; the section is the identity, (F, g, g). Of discs: momentum along x, y, moment of momentum about the origin and spin.
+    """
+    t, path = _motion(system, t, q, v)
+    value, rate = [], []
+    for q_now, v_now in path:
+        x = _generators(system, q_now)
+        value.append(x.T @ system.momentum(q_now, v_now))
+        rate.append(x.T @ (system.constraint(q_now).T @ system.accelerations(q_now, v_now).multipliers))
+    size = len(value[0])
+    return Momenta(t, np.array(value), np.array(rate), np.broadcast_to(np.eye(size), (len(t), size, size)))
+
+
+def nonholonomic_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> Momenta:
+    """The nonholonomic momentum map J along a motion, and its rate <p, (d xi/dt)_Q>; parameters as of `symmetry_momenta`.
+
+    k = dim g^q, and may be 0.
+
+    Raises
+    ------
+    ValueError : if the system has no known symmetry, or dim g^q changes along the motion.
+    """
+    t, path = _motion(system, t, q, v)
+    start = admissible_symmetries(system, path[0][0])
+    value, rate, section = [], [], []
+    for time, (q_now, v_now) in zip(t, path, strict=True):
+        x = _generators(system, q_now)
+        n = np.asarray(system.constraint(q_now) @ x)
+        turning = _generators_rate(system, q_now, v_now)
+        n_rate = np.asarray(system.constraint_rate(q_now, v_now) @ x + system.constraint(q_now) @ turning)
+        inverse = np.linalg.pinv(n, rcond=RANK)
+        projector = np.eye(x.shape[1]) - inverse @ n
+        if round(float(np.trace(projector))) != len(start):
+            raise ValueError(
+                f"the symmetries that the constraints allow must be as many all along: {len(start)} at the start, "
+                f"{round(float(np.trace(projector)))} at t = {time:g}; take the motion in parts"
+            )
+        half = inverse @ n_rate @ projector
+        p = system.momentum(q_now, v_now)
+        section.append(start @ projector)
+        value.append(section[-1] @ (x.T @ p))
+        rate.append(start @ -(half + half.T) @ (x.T @ p))
+    return Momenta(t, np.array(value), np.array(rate), np.array(section))
+
+
+def admissible_symmetries(system: MechanicalSystem, q: ArrayLike) -> NDArray:
+    """A basis of g^q, the symmetries xi with A xi_Q = 0 at q, (k, g)."""
+    q = np.asarray(q, dtype=float)
+    n = np.asarray(system.constraint(q) @ _generators(system, q))
+    _, sizes, directions = np.linalg.svd(n)
+    return directions[int((sizes > RANK * sizes[0]).sum()) :]
+
+
+def _generators_rate(system: MechanicalSystem, q: NDArray, v: NDArray) -> NDArray:
+    """dX/dq.v, X being affine in q."""
+    return _generators(system, q + v) - _generators(system, q)
+
+
+def _generators(system: MechanicalSystem, q: NDArray) -> NDArray:
+    if system.symmetry is None:
+        raise ValueError("momenta belong to symmetries; give the system a symmetry, q -> X (m, g)")
+    return system.symmetry(q)
+
+
+def _motion(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, list[tuple[NDArray, NDArray]]]:
+    t, q, v = (np.asarray(given, dtype=float) for given in (t, q, v))
+    shape = (t.size, len(system.names))
+    if t.ndim != 1 or t.size < 4 or q.shape != shape or v.shape != shape:
+        raise ValueError(
+            f"a motion needs at least 4 times, and q, v of shape (times, {shape[1]}); got {t.shape}, {q.shape}, {v.shape}"
+        )
+    return t, list(zip(q, v, strict=True))

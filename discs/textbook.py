@@ -1,0 +1,341 @@
+r"""Systems of the nonholonomic literature with known answers, through the same machinery as the discs.
+
+Each function returns a `Textbook`: a `discs.mechanics.MechanicalSystem`, an admissible start and, where there is a closed form, the
+motion with its multipliers. All derivations rest on one picture: motion with speed sigma along a direction of angle phi, r. = sigma
+(cos phi, sin phi), has r.. = sigma. (cos phi, sin phi) + sigma phi. (-sin phi, cos phi); the force of constraint gives the second
+part and the forces along the direction the first.
+
+* J. I. Neimark, N. A. Fufaev, Dynamics of Nonholonomic Systems, AMS 1972: knife edge, disc, sleigh;
+* A. M. Bloch, Nonholonomic Mechanics and Control, 2nd ed., Springer 2015, chapter 1: the same, and the particle;
+* K. Modin, O. Verdier, What makes nonholonomic integrators work?, Numer. Math. 145 (2020) 405-435: why methods must be tried on
+  systems that are not reversible as well; the oscillators here are of the kind they study.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import quad
+
+from discs import checks
+from discs.mechanics import MechanicalSystem, Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Textbook:
+    """A system with a known answer.
+
+    Attributes
+    ----------
+    system : the equations.
+    q, v : (m,), coordinates and velocities at t = 0.
+    exact : t -> (q, v, lambda), the motion in closed form; None if there is none.
+    invariants : functions of q, v that the motion keeps, by name.
+    """
+
+    system: MechanicalSystem
+    q: NDArray
+    v: NDArray
+    exact: Callable[[float], tuple[NDArray, NDArray, NDArray]] | None = None
+    invariants: dict[str, Callable[[NDArray, NDArray], float]] = field(default_factory=dict)
+
+    def integrate(self, times: ArrayLike, rtol: float = 1e-11) -> Trajectory:
+        """The motion from the start at times[0] = 0; see `MechanicalSystem.integrate`."""
+        return self.system.integrate(self.q, self.v, times, rtol)
+
+
+def _nonzero(name: str, value: float, why: str) -> float:
+    if checks.number(name, value) == 0:
+        raise ValueError(f"{name} must not be 0 ({why}); got {value!r}")
+    return float(value)
+
+
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        checks.number(name, value, positive=True)
+
+
+def _slope_drift(b: float, c: float, phi: float, start: float) -> tuple[float, float]:
+    """Integrals of (b + c sin phi) cos phi and (b + c sin phi) sin phi from `start` to phi."""
+    along = b * (np.sin(phi) - np.sin(start)) - 0.25 * c * (np.cos(2 * phi) - np.cos(2 * start))
+    across = -b * (np.cos(phi) - np.cos(start)) + c * (0.5 * (phi - start) - 0.25 * (np.sin(2 * phi) - np.sin(2 * start)))
+    return along, across
+
+
+def rolling_disc(
+    mass: float,
+    spin_inertia: float,
+    heading_inertia: float,
+    radius: float,
+    *,
+    roll_rate: float,
+    turn_rate: float,
+    heading: float = 0.0,
+    slope: float = 0.0,
+) -> Textbook:
+    r"""The vertical rolling disc, on a plane or an incline: x. = -R theta. sin phi, y. = R theta. cos phi.
+
+    Coordinates (x, y, theta, phi), phi the direction of the axle; gravity pulls with mass times `slope` (g sin of the incline's
+    angle) along x. The heading turns uniformly, phi = phi_0 + Omega t, since the disc's weight has no moment about the vertical,
+    and
+
+        (alpha + m R^2) theta.. = -m R slope sin phi:   theta. = b + c cos phi,   c = m R slope/((alpha + m R^2) Omega).
+
+    The contact moves with speed R theta. along phi + pi/2: on a plane on a circle of radius R omega/Omega; on an incline in
+    cycloids that drift sideways, R c/2 on average, and never down. The ground's force is lambda = m R (theta.. (-sin phi, cos
+    phi) - Omega theta. (cos phi, sin phi)) - (m slope, 0).
+
+    Source: Neimark and Fufaev, chapter 3; Bloch, section 1.4. `turn_rate` must not be 0.
+    """
+    _positive(mass=mass, spin_inertia=spin_inertia, heading_inertia=heading_inertia, radius=radius)
+    turn = _nonzero("turn_rate", turn_rate, "the disc then rolls on a straight line")
+    m, a, r, pull = mass, spin_inertia, radius, mass * slope
+
+    def constraint(q: NDArray) -> list[list[complex]]:
+        return [[1, 0, r * np.sin(q[3]), 0], [0, 1, -r * np.cos(q[3]), 0]]
+
+    def symmetry(q: NDArray) -> NDArray:
+        if slope:  # along the contour lines, in theta, and in phi
+            return np.eye(4)[:, 1:]
+        return np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [-q[1], q[0], 0, 1]]).T
+
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "theta", "phi"),
+        np.diag([m, m, a, heading_inertia]),
+        lambda q: -pull * q[0],
+        constraint,
+        ("disc", "disc"),
+        symmetry=symmetry,
+    )
+    c = r * pull / ((a + m * r**2) * turn)
+    b = roll_rate - c * np.cos(heading)
+
+    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+        phi = heading + turn * t
+        cos, sin = np.cos(phi), np.sin(phi)
+        rate, change = b + c * cos, -c * turn * sin
+        # the direction of motion is phi + pi/2, whose sine is cos phi
+        x, y = np.array(_slope_drift(b, c, phi + np.pi / 2, heading + np.pi / 2)) * r / turn
+        theta = b * t + c / turn * (sin - np.sin(heading))
+        force = m * r * (change * np.array([-sin, cos]) - turn * rate * np.array([cos, sin])) - [pull, 0]
+        return np.array([x, y, theta, phi]), np.array([-r * rate * sin, r * rate * cos, rate, turn]), force
+
+    q, v, _ = exact(0.0)
+    return Textbook(system, q, v, exact, {"turning": lambda q, v: float(v[3])})
+
+
+def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_rate: float, heading: float = 0.0) -> Textbook:
+    r"""A knife edge (a skate) on an incline: x. sin phi = y. cos phi.
+
+    Coordinates (x, y, phi), gravity along x with mass times `slope`. The blade turns uniformly, its speed u obeys u. = slope cos
+    phi, so u = b + c sin phi, c = slope/Omega; lambda = m u Omega + m slope sin phi across the blade, (-sin phi, cos phi). From
+    rest at phi = 0
+
+        x = slope/(2 Omega^2) sin^2 Omega t,   y = slope/(2 Omega^2) (Omega t - sin(2 Omega t)/2):
+
+    a cycloid; the blade does not go down either.
+
+    Source: Neimark and Fufaev, chapter 3; Bloch, section 1.6. `turn_rate` must not be 0.
+    """
+    _positive(mass=mass, inertia=inertia)
+    turn = _nonzero("turn_rate", turn_rate, "the blade then runs straight")
+    pull = mass * slope
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "phi"),
+        np.diag([mass, mass, inertia]),
+        lambda q: -pull * q[0],
+        lambda q: [[-np.sin(q[2]), np.cos(q[2]), 0]],
+        ("blade",),
+        symmetry=lambda q: np.eye(3)[:, 1:],  # along the contour lines, and in phi
+    )
+    c = slope / turn
+    b = speed - c * np.sin(heading)
+
+    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+        phi = heading + turn * t
+        u = b + c * np.sin(phi)
+        x, y = np.array(_slope_drift(b, c, phi, heading)) / turn
+        force = np.array([mass * u * turn + pull * np.sin(phi)])
+        return np.array([x, y, phi]), np.array([u * np.cos(phi), u * np.sin(phi), turn]), force
+
+    q, v, _ = exact(0.0)
+    return Textbook(system, q, v, exact, {"turning": lambda q, v: float(v[2])})
+
+
+def chaplygin_sleigh(
+    mass: float, inertia: float, offset: float, *, speed: float, turn_rate: float, heading: float = 0.0
+) -> Textbook:
+    r"""The Chaplygin sleigh: a knife edge at (x, y), the centre of mass a distance a = `offset` ahead of it.
+
+    In the coordinates (x, y, phi) of the edge M depends on phi: T = m/2 |(x., y.) + a phi. (-sin phi, cos phi)|^2 + I/2 phi.^2.
+    With the speed u of the edge and J = I + m a^2
+
+        u. = a phi.^2,   J phi.. = -m a u phi.,   so  u^2 + J phi.^2/m = U^2  and, with tau = kappa (t - t_0), kappa = a m U/J,
+
+        u = U tanh tau,   phi. = +-U sqrt(m/J) sech tau,   phi = phi_0 +- sqrt(J/m)/a (gd tau - gd tau_0):
+
+    it ends on a straight line with the centre of mass ahead. lambda = m u phi. I/J; x and y by quadrature of u (cos phi, sin phi).
+
+    Source: Neimark and Fufaev, chapter 3; Bloch, section 1.7. `offset` and `turn_rate` must not be 0.
+    """
+    _positive(mass=mass, inertia=inertia)
+    a = _nonzero("offset", offset, "a knife edge without slope")
+    turn = _nonzero("turn_rate", turn_rate, "the sleigh then runs straight")
+
+    def metric(q: NDArray) -> NDArray:
+        s, c = -mass * a * np.sin(q[2]), mass * a * np.cos(q[2])
+        return np.array([[mass, 0 * s, s], [0 * s, mass, c], [s, c, inertia + mass * a**2]])
+
+    def symmetry(q: NDArray) -> NDArray:
+        return np.array([[1.0, 0.0, -q[1]], [0.0, 1.0, q[0]], [0.0, 0.0, 1.0]])
+
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "phi"), metric, lambda q: 0.0, lambda q: [[-np.sin(q[2]), np.cos(q[2]), 0]], ("blade",), symmetry=symmetry
+    )
+    j = inertia + mass * a**2
+    top = np.sqrt(speed**2 + j * turn**2 / mass)
+    kappa, first = a * mass * top / j, np.arctanh(speed / top)
+
+    def gd(tau: float) -> float:
+        return float(2 * np.arctan(np.tanh(tau / 2)))
+
+    def state(t: float) -> tuple[float, float, float]:
+        tau = kappa * t + first
+        rate = np.sign(turn) * top * np.sqrt(mass / j) / np.cosh(tau)
+        return heading + np.sign(turn) * np.sqrt(j / mass) / a * (gd(tau) - gd(first)), top * np.tanh(tau), rate
+
+    def speed_in(direction: Callable[[float], float]) -> Callable[[float], float]:
+        return lambda t: state(t)[1] * direction(state(t)[0])
+
+    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+        x, y = (quad(speed_in(f), 0, t, epsabs=1e-13, epsrel=1e-13, limit=200)[0] for f in (np.cos, np.sin))
+        phi, u, rate = state(t)
+        return np.array([x, y, phi]), np.array([u * np.cos(phi), u * np.sin(phi), rate]), np.array([mass * u * rate * inertia / j])
+
+    q, v, _ = exact(0.0)
+    return Textbook(system, q, v, exact)
+
+
+def nonholonomic_particle(mass: float, width: float, *, y: float, velocity: tuple[float, float]) -> Textbook:
+    r"""Rosenberg's particle, z. = (y/b) x., free in space; b = `width`, velocity = (x., y.) at the start.
+
+    y moves uniformly. Along (1, y/b)/sqrt(1 + y^2/b^2) no force acts, so x. = C/sqrt(1 + y^2/b^2), and
+
+        x = (C b/y.) [asinh(y/b)],   z = (C b/y.) [sqrt(1 + y^2/b^2)],   lambda = m C (y./b) (1 + y^2/b^2)^{-3/2}.
+
+    Source: R. M. Rosenberg, Analytical Dynamics of Discrete Systems, 1977; Bloch, chapter 5. y. must not be 0.
+    """
+    _positive(mass=mass, width=width)
+    run = _nonzero("velocity[1]", velocity[1], "the particle then moves on a straight line")
+    b = width
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "z"),
+        mass * np.eye(3),
+        lambda q: 0.0,
+        lambda q: [[-q[1] / b, 0, 1]],
+        ("particle",),
+        symmetry=lambda q: np.eye(3),
+    )
+
+    def root(y: float) -> float:
+        return float(np.sqrt(1 + (y / b) ** 2))
+
+    c = velocity[0] * root(y)
+
+    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+        now = y + run * t
+        x = c * b / run * (np.arcsinh(now / b) - np.arcsinh(y / b))
+        z, rate = c * b / run * (root(now) - root(y)), c / root(now)
+        return np.array([x, now, z]), np.array([rate, run, now / b * rate]), np.array([mass * c * run / b / root(now) ** 3])
+
+    q, v, _ = exact(0.0)
+    return Textbook(system, q, v, exact, {"along": lambda q, v: float(v[0] * root(q[1]))})
+
+
+def contact_oscillator(
+    mass: float,
+    stiffness: float,
+    driver_mass: float,
+    driver_stiffness: float,
+    width: float,
+    *,
+    q: ArrayLike,
+    speed: float,
+    drift: float,
+) -> Textbook:
+    r"""The contact oscillator: x. + (y/b) z. = 0, V = (K (x^2 + z^2) + k y^2)/2; b = `width`, k = `driver_stiffness`.
+
+    The constraint's force has no part in y, which oscillates by itself, and drives the others: (x, z) move with speed sigma along
+    (-sin chi, cos chi), tan chi = y/b, where m sigma. = K (x sin chi - z cos chi). So (x, z, sigma sqrt(m/K)) turns on a sphere,
+    and both energies are kept. `speed` is sigma and `drift` is y. at the start, q = (x, y, z).
+
+    A motion with y through t_0 at rest is the same before and after: reversible, as all usual test problems are; see
+    `driven_oscillator` for one that is not.
+
+    Source: R. McLachlan, M. Perlmutter, J. Nonlinear Sci. 16 (2006) 283-328; Modin and Verdier (2020).
+    """
+    _positive(mass=mass, stiffness=stiffness, driver_mass=driver_mass, driver_stiffness=driver_stiffness, width=width)
+    return _driven(
+        ("x", "y", "z"),
+        (mass, stiffness, driver_mass),
+        lambda y: 0.5 * driver_stiffness * y**2,
+        lambda y: y / width,
+        q,
+        speed,
+        drift,
+    )
+
+
+def driven_oscillator(
+    mass: float, stiffness: float, driver_mass: float, wave: float, skew: float, *, q: ArrayLike, speed: float, drift: float
+) -> Textbook:
+    r"""A continuously variable transmission that is not reversible: x. + sin(y) z. = 0, U(y) = wave (cos y + skew sin(2y)/2).
+
+    As `contact_oscillator`, but the driver is a pendulum that goes round: without a turning point, it is the same before and
+    after some moment only if U is even about some place. skew = 0 is the reversible one; any other is integrable still, driver
+    and oscillator keep an energy each, but not reversible, and methods that owe their long-time behaviour to reversibility fail
+    on it.
+
+    Source: of the kind that Modin and Verdier (2020) construct by perturbing the pendulum-driven transmission; parameters are ours.
+    Raises ValueError unless the driver goes round.
+    """
+    _positive(mass=mass, stiffness=stiffness, driver_mass=driver_mass, wave=wave)
+
+    def hill(y: NDArray) -> NDArray:
+        return wave * (np.cos(y) + 0.5 * skew * np.sin(2 * y))
+
+    start = checks.vector("q", q, 3)
+    top = float(np.max(hill(np.linspace(0, 2 * np.pi, 1001))))
+    if 0.5 * driver_mass * drift**2 + float(hill(start[1])) <= top:
+        least = np.sqrt(2 * (top - float(hill(start[1]))) / driver_mass)
+        raise ValueError(f"drift must be above {least:.6g} in size for the driver to go round; got {drift!r}")
+    return _driven(("x", "y", "z"), (mass, stiffness, driver_mass), hill, np.sin, q, speed, drift)
+
+
+def _driven(
+    names: tuple[str, ...],
+    parameters: tuple[float, float, float],
+    hill: Callable[[NDArray], NDArray],
+    gear: Callable[[NDArray], Any],
+    q: ArrayLike,
+    speed: float,
+    drift: float,
+) -> Textbook:
+    """An oscillator in (x, z) with x. + gear(y) z. = 0, y moving by itself in the potential `hill`."""
+    mass, stiffness, driver = parameters
+    start = checks.vector("q", q, 3)
+    system = MechanicalSystem.from_lagrangian(
+        names,
+        np.diag([mass, driver, mass]),
+        lambda q: 0.5 * stiffness * (q[0] ** 2 + q[2] ** 2) + hill(q[1]),
+        lambda q: [[1, 0, gear(q[1])]],
+        ("oscillator",),
+    )
+    chi = np.arctan(gear(start[1]))
+    invariants: dict[str, Callable[[NDArray, NDArray], float]] = {
+        "driver": lambda q, v: float(0.5 * driver * v[1] ** 2 + hill(q[1])),
+        "oscillator": lambda q, v: 0.5 * float(mass * (v[0] ** 2 + v[2] ** 2) + stiffness * (q[0] ** 2 + q[2] ** 2)),
+    }
+    return Textbook(system, start, np.array([-speed * np.sin(chi), drift, speed * np.cos(chi)]), None, invariants)
