@@ -17,7 +17,6 @@ distance d whose headings differ by delta, mirrored by the line between them, to
 """
 
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -152,10 +151,9 @@ def footprints_touch(run: Solution, radius: ArrayLike, thickness: float) -> NDAr
     return np.array(sorted(touches), dtype=int).reshape(-1, 3)
 
 
-def _pymunk() -> ModuleType:
+def _pymunk() -> Any:
     try:
         import pymunk
     except ImportError:
         raise ImportError('the contact checks need pymunk: pip install "rolling-discs[contact]"') from None
-    module: Any = pymunk
-    return module
+    return pymunk

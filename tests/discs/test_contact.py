@@ -87,11 +87,15 @@ def test_it_slips_below_the_friction_that_the_ground_force_needs():
     assert (run.slip[1:] < -0.01).all()
 
 
+def still(x, y, phi):
+    """A run of given places and headings, (F, N)."""
+    return Solution(np.arange(len(x)), np.arange(x.shape[1]), x, y, 0 * x, 0 * x, np.zeros(len(x)), phi=phi)
+
+
 def ring(n, a, turn=0.0):
     """One frame of discs on a circle, axles along it."""
-    u = 2 * np.pi * np.arange(n) / n + turn
-    none = np.zeros((1, n))
-    return Solution(np.zeros(1), u, a * np.cos(u)[None], a * np.sin(u)[None], none, none, np.zeros(1), phi=(u + np.pi / 2)[None])
+    u = 2 * np.pi * np.arange(n)[None] / n + turn
+    return still(a * np.cos(u), a * np.sin(u), u + np.pi / 2)
 
 
 @pytest.mark.parametrize("thickness", [1e-4, 0.05, 0.2])
@@ -109,13 +113,8 @@ def test_on_a_circle_they_touch_at_the_radius_of_the_rule(thickness):
 
 def test_touches_are_named():
     run = ring(5, 1.0)
-    x = run.x.copy()
-    x[0, 1] += 10
-    moved = Solution(run.t, run.s, x, run.y, run.theta, run.omega, run.energy, phi=run.phi)
-    both = Solution(
-        *(np.concatenate([getattr(a, f) for a in (run, moved)]) for f in ("t", "s", "x", "y", "theta", "omega", "energy"))
-    )
-    both = Solution(**{f: getattr(both, f) for f in both.__dataclass_fields__} | {"phi": np.repeat(run.phi, 2, axis=0)})
+    away = run.x + 10 * (np.arange(5) == 1)
+    both = still(np.concatenate([run.x, away]), np.repeat(run.y, 2, axis=0), np.repeat(run.phi, 2, axis=0))
     expected = [(0, 0, 1), (0, 0, 4), (0, 1, 2), (0, 2, 3), (0, 3, 4), (1, 0, 4), (1, 2, 3), (1, 3, 4)]
     touches = footprints_touch(both, 0.8, 0.3)
     assert [tuple(t) for t in touches] == expected
