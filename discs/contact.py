@@ -1,0 +1,159 @@
+r"""Checks by a planar contact solver, pymunk: does contact with friction make a disc roll, and do discs get in each other's way?
+
+Needs the extra "contact" (pymunk 6.6 or newer; 6.6.2 and 7.3.1 are tested).
+
+**Rolling.** One disc in its own vertical plane on the ground, driven through a torsion spring of stiffness c by a fixed end that is
+turned by psi: torque tau = c (psi - theta). With f the ground's force, m x.. = f and I theta.. = tau - R f; rolling, x. = R theta.,
+
+    theta.. = tau/(I + m R^2),   a = R tau/(I + m R^2),   f = m a,
+
+so from rest theta = psi (1 - cos Omega t), Omega^2 = c/(I + m R^2). Dry friction can give f while |f| <= mu N, N = m g: the disc
+begins to slip at the start, where tau is largest, if mu < R c psi/((I + m R^2) g).
+
+**Touching.** From above a disc is a rectangle, 2 R along its rolling direction by a thickness b along its axle. Neighbours at a
+distance d whose headings differ by delta, mirrored by the line between them, touch with their inner corners if
+
+    2 R sin(|delta|/2) + b cos(delta/2) >= d;   fine chain, kappa = delta/d:  R |kappa| >= 1 - b/d;   thin discs:  R |kappa| >= 1.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from discs import checks
+from discs.solution import Solution
+
+
+@dataclass(frozen=True, eq=False)
+class Rolled:
+    """A disc driven by a torsion spring along the ground, at the F = steps + 1 times of a contact solver.
+
+    Attributes
+    ----------
+    t : (F,), times.
+    x, theta : (F,), place, length, and roll angle, rad; positive roll takes it to positive x.
+    speed, omega : (F,), their rates.
+    friction, normal : (F - 1,), the ground's force in each step, along x and upwards.
+    slip : (F,), speed - R omega.
+    """
+
+    t: NDArray
+    x: NDArray
+    theta: NDArray
+    speed: NDArray
+    omega: NDArray
+    friction: NDArray
+    normal: NDArray
+    slip: NDArray
+
+
+def rolling_in_pymunk(
+    *,
+    mass: float,
+    spin_inertia: float,
+    radius: float,
+    stiffness: float,
+    twist: float,
+    gravity: float,
+    friction: float,
+    dt: float,
+    steps: int,
+) -> Rolled:
+    """A disc from rest on the ground, driven through a torsion spring; nothing but dry friction makes it roll.
+
+    Parameters
+    ----------
+    mass, spin_inertia, radius : m, I about the axle, R; > 0.
+    stiffness : c, torque per angle; > 0.
+    twist : psi, the angle by which the spring's other end is turned.
+    gravity : g > 0.
+    friction : coefficient of friction mu, >= 0.
+    dt : the solver's step; its error is of first order.
+    steps : how many.
+
+    Raises
+    ------
+    ValueError : for a parameter outside its range.
+    ImportError : without pymunk.
+    """
+    names = ("mass", "spin_inertia", "radius", "stiffness", "gravity", "dt")
+    given = zip(names, (mass, spin_inertia, radius, stiffness, gravity, dt), strict=True)
+    m, spin, radius, c, g, h = (checks.number(name, value, positive=True) for name, value in given)
+    psi, mu = checks.number("twist", twist), float(checks.field("friction", friction, 1, least=0.0)[0])
+    steps = checks.whole("steps", steps, 1)
+    pymunk = _pymunk()
+    space = pymunk.Space()
+    space.gravity = (0, -g)
+    space.collision_slop = 1e-3 * radius
+    body = pymunk.Body(m, spin)
+    body.position = (0, radius - 0.5 * space.collision_slop)  # in contact, less deep than what the solver pushes out
+    disc = pymunk.Circle(body, radius)
+    reach = radius * (abs(psi) + 1) * 10
+    ground = pymunk.Segment(space.static_body, (-reach, 0), (reach, 0), 0)
+    disc.friction, ground.friction = mu, 1.0  # pymunk multiplies the two
+    # pymunk counts angles anticlockwise, which is rolling to negative x
+    spring = pymunk.DampedRotarySpring(space.static_body, body, psi, c, 0.0)
+    space.add(body, disc, ground, spring)
+
+    states, forces = np.zeros((steps + 1, 4)), np.zeros((steps, 2))
+    for step in range(steps):
+        space.step(h)
+        states[step + 1] = body.position.x, -body.angle, body.velocity.x, -body.angular_velocity
+        body.each_arbiter(lambda arbiter, step=step: forces.__setitem__(step, np.array(arbiter.total_impulse) / h))
+    x, theta, speed, omega = states.T
+    return Rolled(h * np.arange(steps + 1), x, theta, speed, omega, forces[:, 0], forces[:, 1], speed - radius * omega)
+
+
+def footprints_touch(run: Solution, radius: ArrayLike, thickness: float) -> NDArray:
+    """Which discs touch, seen from above as rectangles 2 R by `thickness`.
+
+    Parameters
+    ----------
+    run : a motion with own headings, or one recorded with want=("slope",).
+    radius : R > 0, a number or one per disc (N,).
+    thickness : b > 0, along the axle; length, as the radius.
+
+    Returns
+    -------
+    (touches, 3), int: frame, disc, other disc with a higher number, in this order sorted.
+
+    Raises
+    ------
+    ValueError : for a run without headings or a size that is not positive.
+    ImportError : without pymunk.
+    """
+    n = run.x.shape[1]
+    radius = checks.field("radius", radius, n, least=0.0, strict=True)
+    thickness = checks.number("thickness", thickness, positive=True)
+    if run.phi is not None:
+        headings = run.phi
+    elif run.slope_x is not None and run.slope_y is not None:
+        headings = np.arctan2(run.slope_y, run.slope_x)
+    else:
+        raise ValueError('run must tell the headings: simulate(..., want=("slope",))')
+    pymunk = _pymunk()
+    space, numbers = pymunk.Space(), {}
+    for i in range(n):
+        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        shape = pymunk.Poly.create_box(body, (thickness, 2 * radius[i]))
+        space.add(body, shape)
+        numbers[shape] = i
+    touches = []
+    for f, places in enumerate(zip(run.x, run.y, headings, strict=True)):
+        for shape, (x, y, phi) in zip(numbers, np.transpose(places).tolist(), strict=True):
+            shape.body.position, shape.body.angle = (x, y), phi
+            space.reindex_shapes_for_body(shape.body)
+        for shape, i in numbers.items():
+            others = (numbers[hit.shape] for hit in space.shape_query(shape))
+            touches += [(f, i, j) for j in others if j > i]
+    return np.array(sorted(touches), dtype=int).reshape(-1, 3)
+
+
+def _pymunk() -> Any:
+    try:
+        import pymunk
+    except ImportError:
+        raise ImportError('the contact checks need pymunk: pip install "rolling-discs[contact]"') from None
+    return pymunk
