@@ -11,7 +11,7 @@ import numpy as np
 from discs.integrators import Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
-from discs.system import Phase, SkewGradient
+from discs.system import Phase, RollingDiscs
 
 NOTICE = 2.0  # seconds of compiling after which it is said
 _PREPARED: set[tuple[type, type]] = set()
@@ -34,7 +34,7 @@ class SimulationError(RuntimeError):
         return type(self), (self.message, self.step, self.time, self.disc)
 
 
-def _warn_of_lost_digits(system: SkewGradient, h: float) -> None:
+def _warn_of_lost_digits(system: RollingDiscs, h: float) -> None:
     """Warn where solves with I + h^2/4 C^T S C lose the digits that sweeps would win back.
 
     A sweep multiplies what is still wrong by the largest entry, h^2 `stiffest`, times the unit of rounding, 1.1e-16: sweeps stop

@@ -10,7 +10,7 @@ from discs import checks
 from discs.chain import Chain, SteeredChain
 from discs.slaved import SlavedSystem
 from discs.steered import SteeredSystem
-from discs.system import Phase, SkewGradient
+from discs.system import Phase, RollingDiscs
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class Problem:
             raise ValueError(f"spin_inertia must be positive where r' = 0, as at disc {i}; got 0")
 
     @cached_property
-    def system(self) -> SkewGradient:
+    def system(self) -> RollingDiscs:
         """The equations of motion."""
         return SteeredSystem(self.chain) if isinstance(self.chain, SteeredChain) else SlavedSystem(self.chain)
 

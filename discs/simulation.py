@@ -15,7 +15,7 @@ from discs.marching import March
 from discs.problem import Problem
 from discs.solution import Solution
 from discs.step import suggest_dt
-from discs.system import SkewGradient
+from discs.system import RollingDiscs
 from discs.tolerance import to_tolerance
 
 WANTS = ("velocity", "slope", "contact_force")
@@ -113,7 +113,7 @@ def simulate(
     return Solution(t=times, s=problem.chain.s, stats=stats, **rows)
 
 
-def _extras(system: SkewGradient, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:
+def _extras(system: RollingDiscs, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:
     """What a frame records only when asked to."""
     shape, rate = system.shape(frame.hi, frame.lo), frame.rate
     found: dict[str, Any] = {}

@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from discs import stencils
 from discs.chain import Chain
 from discs.springs import LinearCurvature, TrueCurvature
-from discs.system import Phase, SkewGradient, folded
+from discs.system import Phase, RollingDiscs, folded
 
 
-class SlavedSystem(SkewGradient):
+class SlavedSystem(RollingDiscs):
     """The equations of motion of a `Chain`; a shape is its links, (3, n_links). The springs are those of `discs.springs`."""
 
     rows = ("x", "y", "theta")

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from discs import stencils
 from discs.chain import SteeredChain
-from discs.system import Assembly, Phase, SkewGradient, folded
+from discs.system import Assembly, Phase, RollingDiscs, folded
 
 
 class Links(NamedTuple):
@@ -55,7 +55,7 @@ class Section(NamedTuple):
     strain: NDArray
 
 
-class SteeredSystem(SkewGradient):
+class SteeredSystem(RollingDiscs):
     """The equations of motion of a `SteeredChain`."""
 
     rows = ("x", "y", "theta", "phi")

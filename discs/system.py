@@ -2,7 +2,7 @@ r"""What every chain of rolling discs is: a skew-gradient system q' = C(q) pi, p
 
 The columns of C span the velocities that rolling allows, scaled so that C^T M C = 1 for the mass matrix M; pi are the rates along
 them. H = |pi|^2/2 + V(q) is constant because the two factors C are each other's transpose, and the constraint holds identically.
-`discs.slaved` and `discs.steered` are the two realisations; the derivations stand there.
+`discs.slaved` and `discs.steered` are chains in this form; the derivations stand there. (`continuum.spectral` is the field.)
 
 A configuration q is an array (rows, n), one row for each coordinate of a disc. All that forces need of it is its *shape*: the
 differences between neighbours, and headings where a disc has its own. Shapes are formed from both parts of the positions.
@@ -42,12 +42,69 @@ def add(hi: NDArray, lo: NDArray, increment: NDArray) -> tuple[NDArray, NDArray]
 
 
 class SkewGradient(ABC):
-    """The equations of motion of a chain.
+    """Equations q. = C(q) pi, pi. = -C(q)^T grad V(q): all that integrators need to know.
 
     Attributes
     ----------
-    n : number of discs.
-    scale : (rows,), the size of a motion: the chain's length, and a radian.
+    n : number of discs, or of functions that a field is made of.
+    rows : names of the rows of q.
+    scale : (rows,), the size of a motion: a length, and a radian.
+    """
+
+    n: int
+    rows: tuple[str, ...]
+    scale: NDArray
+
+    @abstractmethod
+    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Any:
+        """The shape of positions hi + lo: what C and V depend on."""
+
+    @abstractmethod
+    def moved(self, shape: Any, dq: NDArray) -> Any:
+        """The shape after a change dq (rows, n) of the positions."""
+
+    @abstractmethod
+    def frame(self, shape: Any) -> Any:
+        """C, as `forward`, `back` and `solve` take it."""
+
+    @abstractmethod
+    def forward(self, c: Any, p: NDArray) -> NDArray:
+        """C p, (rows, n)."""
+
+    @abstractmethod
+    def back(self, c: Any, g: NDArray) -> NDArray:
+        """C^T g, of the shape of pi."""
+
+    @abstractmethod
+    def potential(self, shape: Any) -> float:
+        """V."""
+
+    @abstractmethod
+    def secant(self, shape: Any, dq: NDArray) -> Any:
+        """What depends on a step dq (rows, n) from a shape: the mean geometry that `mean_force` and `solve` need."""
+
+    @abstractmethod
+    def mean_force(self, secant: Any) -> NDArray:
+        """The discrete gradient of V over the step, (rows, n); grad V if the step is zero."""
+
+    @abstractmethod
+    def solve(self, secant: Any, c: Any, g: complex, rhs: NDArray) -> NDArray:
+        """Solve (I + g C^T S C) p = rhs for p, of the shape of pi, S = B^T (stiffness) B."""
+
+    def gradient(self, shape: Any) -> NDArray:
+        """grad V, (rows, n)."""
+        return self.mean_force(self.secant(shape, self._no_step))
+
+    @cached_property
+    def _no_step(self) -> NDArray:
+        return np.zeros((len(self.rows), self.n))
+
+
+class RollingDiscs(SkewGradient):
+    """The equations of motion of a chain. A frame is the entries of C, (rows, n).
+
+    Attributes
+    ----------
     rows : names of the coordinates of a disc, "x", "y", "theta" and, with own headings, "phi".
     weights : (rows, n), inertia of each disc against each coordinate's rate.
     quadratic : whether V is quadratic, so that secants do not depend on the step.
@@ -56,9 +113,6 @@ class SkewGradient(ABC):
     stiffest : bound of the entries of C^T (grad^2 V) C, per time squared.
     """
 
-    n: int
-    scale: NDArray
-    rows: tuple[str, ...]
     weights: NDArray
     quadratic: bool
     closed: bool
@@ -66,14 +120,6 @@ class SkewGradient(ABC):
     stiffest: float
 
     # Kinematics
-
-    @abstractmethod
-    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Any:
-        """The shape of positions hi + lo."""
-
-    @abstractmethod
-    def moved(self, shape: Any, dq: NDArray) -> Any:
-        """The shape after a change dq (rows, n) of the positions."""
 
     @abstractmethod
     def slope(self, shape: Any) -> NDArray:
@@ -86,18 +132,6 @@ class SkewGradient(ABC):
     @abstractmethod
     def contact_rate(self, shape: Any, v: NDArray) -> NDArray:
         """Rates of the contact directions, e., (2, n), for rates v (rows, n) of the coordinates. Length per time."""
-
-    @abstractmethod
-    def frame(self, shape: Any) -> NDArray:
-        """The entries of C, (rows, n)."""
-
-    @abstractmethod
-    def forward(self, c: NDArray, p: NDArray) -> NDArray:
-        """C p, (rows, n)."""
-
-    @abstractmethod
-    def back(self, c: NDArray, g: NDArray) -> NDArray:
-        """C^T g, of the shape of pi."""
 
     @abstractmethod
     def momentum(self, shape: Any, rates: NDArray) -> NDArray:
@@ -114,28 +148,12 @@ class SkewGradient(ABC):
     # Springs
 
     @abstractmethod
-    def potential(self, shape: Any) -> float:
-        """V."""
-
-    @abstractmethod
-    def secant(self, shape: Any, dq: NDArray) -> Any:
-        """What depends on a step dq (rows, n) from a shape: the mean geometry that `mean_force` and `stiffness` need."""
-
-    @abstractmethod
-    def mean_force(self, secant: Any) -> NDArray:
-        """The discrete gradient of V over the step, (rows, n); grad V if the step is zero."""
-
-    @abstractmethod
     def stiffness(self, secant: Any, c: NDArray) -> NDArray:
         """Upper bands (width + 1, unknowns) of C^T B^T (stiffness) B C, as LAPACK stores them, unknowns in `order`."""
 
     @abstractmethod
     def polarised(self, shape: Any, other: Any) -> float:
         """The symmetric bilinear form of which V is the square; ValueError unless V is quadratic."""
-
-    def gradient(self, shape: Any) -> NDArray:
-        """grad V, (rows, n)."""
-        return self.mean_force(self.secant(shape, self._no_step))
 
     def contact_force(self, shape: Any, v: NDArray) -> NDArray:
         """Force lambda of the ground on each disc, (2, n), for admissible rates v (rows, n).
@@ -148,10 +166,6 @@ class SkewGradient(ABC):
         inertia = self.weights[2] + mass * (e * e).sum(axis=0)
         torque = -(e * gradient[:2]).sum(axis=0) - gradient[2] - mass * omega * (e * turning).sum(axis=0)
         return mass * (e * (torque / inertia) + turning * omega) + gradient[:2]
-
-    @cached_property
-    def _no_step(self) -> NDArray:
-        return np.zeros((len(self.rows), self.n))
 
     @property
     @abstractmethod
@@ -170,10 +184,8 @@ class SkewGradient(ABC):
         return None if self.order is None else np.argsort(self.order)
 
     def solve(self, secant: Any, c: NDArray, g: complex, rhs: NDArray) -> NDArray:
-        """Solve (I + g C^T B^T (stiffness) B C) p = rhs for p, of the shape of pi; O(n).
-
-        For g > 0 by banded Cholesky, for a complex g by banded elimination. In double precision whatever that of `rhs`, which
-        is enough for a correction: a state in `longdouble` is carried on in extended precision.
+        """In O(n): for g > 0 by banded Cholesky, for a complex g by banded elimination. In double precision whatever that of
+        `rhs`, which is enough for a correction: a state in `longdouble` is carried on in extended precision.
         """
         matrix = g * self.stiffness(secant, c)
         matrix[-1] += 1

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.system import Phase, SkewGradient
+from discs.system import Phase, RollingDiscs
 
 
 @dataclass
@@ -73,14 +73,14 @@ class Integrator(ABC):
     adaptive: ClassVar[bool] = False
 
     @abstractmethod
-    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> Any:
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Any:
         """What the method must remember between steps of size h, at the first time.
 
         `chain`, here and below, are the parameters for the compiled form, `system.kernel`; None for the plain one.
         """
 
     @abstractmethod
-    def advance(self, system: SkewGradient, memory: Any, h: float, work: Work) -> Any:
+    def advance(self, system: RollingDiscs, memory: Any, h: float, work: Work) -> Any:
         """The memory one step h later."""
 
     @abstractmethod
@@ -91,14 +91,14 @@ class Integrator(ABC):
         """
 
     @abstractmethod
-    def at(self, system: SkewGradient, memory: Any, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(self, system: RollingDiscs, memory: Any, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         """The discs a time 0 <= tau < h after the last step (of size h); the trajectory is not touched."""
 
     @abstractmethod
-    def kinetic(self, system: SkewGradient, memory: Any, h: float) -> float:
+    def kinetic(self, system: RollingDiscs, memory: Any, h: float) -> float:
         """Kinetic energy at the last step; for a two-step method, half a step later."""
 
-    def extras(self, system: SkewGradient, memory: Any, h: float) -> dict[str, float]:
+    def extras(self, system: RollingDiscs, memory: Any, h: float) -> dict[str, float]:
         """The quantities in `offers`, at the last step."""
         return {}
 
@@ -107,7 +107,7 @@ class OneStep(Integrator):
     """A method whose step needs the state alone: the memory is the state, and frames are reached by a shorter step."""
 
     @abstractmethod
-    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: RollingDiscs, z: Phase, h: float, work: Work) -> Phase:
         """One step from z, a pure function of its arguments (work is counted up)."""
 
     @abstractmethod
@@ -116,7 +116,7 @@ class OneStep(Integrator):
         entries."""
 
     @final
-    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> Phase:
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Phase:
         return z
 
     @final
@@ -125,11 +125,11 @@ class OneStep(Integrator):
         return z, Tally(*self.kernel(chain, z.hi, z.lo, np.atleast_2d(z.pi), h, steps, bound))
 
     @final
-    def advance(self, system: SkewGradient, memory: Phase, h: float, work: Work) -> Phase:
+    def advance(self, system: RollingDiscs, memory: Phase, h: float, work: Work) -> Phase:
         return self.step(system, memory, h, work)
 
     @final
-    def at(self, system: SkewGradient, memory: Phase, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(self, system: RollingDiscs, memory: Phase, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         if chain is None:
             z = self.step(system, memory, tau, work) if tau else memory
             return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
@@ -144,5 +144,5 @@ class OneStep(Integrator):
         return Frame(z.hi, z.lo, rate)
 
     @final
-    def kinetic(self, system: SkewGradient, memory: Phase, h: float) -> float:
+    def kinetic(self, system: RollingDiscs, memory: Phase, h: float) -> float:
         return 0.5 * float(np.vdot(memory.pi, memory.pi))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import Frame, Integrator, Tally, Work
-from discs.system import Phase, SkewGradient
+from discs.system import Phase, RollingDiscs
 
 
 class Reduced:
@@ -24,7 +24,7 @@ class Reduced:
     chain : `system.kernel` for the compiled form, None for the plain one.
     """
 
-    def __init__(self, system: SkewGradient, chain: Any = None) -> None:
+    def __init__(self, system: RollingDiscs, chain: Any = None) -> None:
         self.system, self.chain, self.rows, self.n = system, chain, len(system.rows), system.n
 
     def join(self, q: NDArray, pi: NDArray) -> NDArray:
@@ -93,24 +93,24 @@ class SolveIvp(Integrator, ABC):
         """What the method is told about the Jacobian."""
         return {}
 
-    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> "Course":
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> "Course":
         f = Reduced(system, chain)
         method = getattr(scipy.integrate, self.name)
         y = f.join(z.hi + z.lo, z.pi)
         solver = method(f, 0.0, y, np.inf, rtol=self.rtol, atol=self.atol, max_step=h, **self.options(f))
         return Course(f, solver, 0.0, z)
 
-    def advance(self, system: SkewGradient, memory: "Course", h: float, work: Work) -> "Course":
+    def advance(self, system: RollingDiscs, memory: "Course", h: float, work: Work) -> "Course":
         return memory.to(memory.time + h, work)
 
     def march(self, chain: Any, memory: "Course", h: float, steps: int, bound: float) -> tuple["Course", Tally]:
         raise NotImplementedError("SciPy's methods are not compiled; their equations are")
 
-    def at(self, system: SkewGradient, memory: "Course", tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(self, system: RollingDiscs, memory: "Course", tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         z = memory.to(memory.time + tau, work) if tau else memory
         return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
 
-    def kinetic(self, system: SkewGradient, memory: "Course", h: float) -> float:
+    def kinetic(self, system: RollingDiscs, memory: "Course", h: float) -> float:
         return 0.5 * float(np.vdot(memory.pi, memory.pi))
 
 

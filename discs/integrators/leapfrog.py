@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from discs.integrators.base import Frame, Integrator, Tally, Work
 from discs.integrators.rk4 import RK4
-from discs.system import Phase, SkewGradient, add
+from discs.system import Phase, RollingDiscs, add
 
 
 class TwoStep(NamedTuple):
@@ -44,13 +44,13 @@ class Leapfrog(Integrator):
     stability_limit: ClassVar[float] = 2.0
     offers: ClassVar[tuple[str, ...]] = ("modified_energy",)
 
-    def begin(self, system: SkewGradient, z: Phase, h: float, work: Work, chain: Any = None) -> TwoStep:
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> TwoStep:
         first = RK4().step(system, z, h, work)
         move = (first.hi - z.hi) + (first.lo - z.lo)
         central = 2 * h * system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi)
         return TwoStep(z.hi, z.lo, central - move, move)
 
-    def advance(self, system: SkewGradient, memory: TwoStep, h: float, work: Work) -> TwoStep:
+    def advance(self, system: RollingDiscs, memory: TwoStep, h: float, work: Work) -> TwoStep:
         hi, lo = add(memory.hi, memory.lo, memory.next)
         shape = system.shape(hi, lo)
         c = system.frame(shape)
@@ -64,17 +64,17 @@ class Leapfrog(Integrator):
         after = TwoStep(*(array.copy() for array in memory))
         return after, Tally(*methods.leapfrog(chain, *after, h, steps, bound))
 
-    def at(self, system: SkewGradient, memory: TwoStep, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(self, system: RollingDiscs, memory: TwoStep, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         rate = (memory.last + memory.next) / (2 * h)
         if not tau:
             return Frame(memory.hi, memory.lo, rate)
         pi = system.back(system.frame(system.shape(memory.hi, memory.lo)), system.weights * rate)
         return RK4().at(system, Phase(memory.hi, memory.lo, pi), tau, h, work, chain)
 
-    def kinetic(self, system: SkewGradient, memory: TwoStep, h: float) -> float:
+    def kinetic(self, system: RollingDiscs, memory: TwoStep, h: float) -> float:
         return system.kinetic(memory.next / h)
 
-    def extras(self, system: SkewGradient, memory: TwoStep, h: float) -> dict[str, float]:
+    def extras(self, system: RollingDiscs, memory: TwoStep, h: float) -> dict[str, float]:
         shape = system.shape(memory.hi, memory.lo)
         polarised = system.polarised(shape, system.moved(shape, memory.next))
         return {"modified_energy": self.kinetic(system, memory, h) + polarised}

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.system import Phase, SkewGradient, add
+from discs.system import Phase, RollingDiscs, add
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class McLachlanPerlmutter(OneStep):
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
 
-    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: RollingDiscs, z: Phase, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)
         v = system.forward(system.frame(shape), z.pi)
         half, move = 0.5 * h * v, h * v
