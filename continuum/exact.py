@@ -59,14 +59,17 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     b = 1 / a0**2 if n is None else (2 / k * np.sin(np.pi / n)) ** 2
     r, stiffness = rod.radius, rod.bending_stiffness * b**2
     if rolling == "unit":
-        nu = r * np.sqrt(stiffness / rod.inertia)
+        pull = r * stiffness / rod.inertia
+        nu = np.sqrt(r * pull)
         end = _collapse(a0, r * omega, nu)
         if t[-1] >= end:
             raise ValueError(f"the ring is a point at t = {end:g}; ask for earlier times")
         # sin(nu t)/nu, which is t for a rod that does not bend
         sine = t * np.sinc(nu * t / np.pi)
         a = a0 * np.cos(nu * t) - r * omega * sine
-        return Ring(a, (a0 - a) / r, a0 * nu**2 * sine / r + omega * np.cos(nu * t))
+        # (a_0 - a)/R, written so that R may be 0
+        theta = a0 * pull * t**2 / 2 * np.sinc(nu * t / (2 * np.pi)) ** 2 + omega * sine
+        return Ring(a, theta, a0 * pull * sine + omega * np.cos(nu * t))
 
     def rate(_: float, z: NDArray) -> list[float]:
         stretch = np.exp(-2 * r * g * z[0] / a0)
