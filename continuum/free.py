@@ -15,15 +15,15 @@ S and S_t of plain springs, whose ends are natural here. With M = rho w and the 
 
     d . L M^{-1} L^T (p d/k) = |L v|^2 - d . L M^{-1} S r.                                                                 (tension)
 
-**In t.** The variational integrator of L_h = h T(u/h) - h V((r_n + r_{n+1})/2), u = r_{n+1} - r_n, with the constraint at every node of
-time: the midpoint rule in bending, RATTLE in the constraint,
+**In t.** The variational integrator of L_h = h T(u/h) - h V((r_n + r_{n+1})/2), u = r_{n+1} - r_n, under the constraint at every
+step: the midpoint rule in bending, RATTLE in the constraint,
 
     M u/h = M v_n - h/2 S (r_n + u/2) - L^T (mu d_n)/h,               |L (r_n + u)| = l,
     M v_{n+1} = M u/h - h/2 S (r_n + u/2) - L^T (nu d_{n+1}),         d_{n+1} . L v_{n+1} = 0.
 
-Newton's method on the first, in u and mu at once, is banded; nu is tridiagonal. It is symplectic and reversible, of order 2; bending
-limits no step. Momentum and angular momentum are kept to rounding, L_h having their symmetries, and the lengths because they are
-solved for; the energy swings by O(h^2) without drift, and is exact where the constraint does not act (theta; small waves).
+Newton's method on the first line, in u and mu at once, is banded; nu is tridiagonal. The step is symplectic and reversible, of
+order 2, and bending does not limit it. Momentum and angular momentum are kept to rounding, as L_h has their symmetries, and so
+are the lengths, which are solved for; the energy swings by O(h^2) without drift, and is exact for theta and for small waves.
 """
 
 from collections.abc import Callable
@@ -107,7 +107,7 @@ class FreeRod:
 
     def bent(self, r: NDArray) -> NDArray:
         """S r, (2, n)."""
-        return self.gradient(*r, np.zeros_like(r[0]))[:2]
+        return self.gradient(r[0], r[1], np.zeros_like(r[0]))[:2]
 
     def _constrain(self, d: NDArray, right: NDArray) -> NDArray:
         """The multiplier of d . L M^{-1} L^T (multiplier d) = right."""
@@ -174,7 +174,8 @@ def free_rod(
     Parameters
     ----------
     rod : the rod; its radius does not matter, as nothing rolls. Linear curvature, which is the true one while |r'| = 1.
-    r0, v0 : places and velocities of the centre line, functions of s (n,) that return (2, n), or (2, n). |r0'| = 1 and r0' . v0' = 0.
+    r0, v0 : places and velocities of the centre line with |r0'| = 1 and r0' . v0' = 0: functions of s (n,) that return (2, n), or
+        (2, n).
     theta0, omega0 : torsion and its rate, functions of s that return (n,), or (n,), or a number.
     duration : time to move, > 0.
     n : nodes, at least 3, both ends counted; at least 5 around a ring.
@@ -212,7 +213,8 @@ def free_rod(
         return *system.step(r, v, h, length), *system.twist(theta, omega, h)
 
     found: list[tuple[NDArray, ...]] = []
-    state, step = (r, v, theta, omega), 0
+    state: tuple[NDArray, ...] = r, v, theta, omega
+    step = 0
     with tqdm(total=int(times[-1] / h), desc="free rod", unit="step", delay=1, disable=not progress) as bar:
         try:
             for time in times:

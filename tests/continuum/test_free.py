@@ -126,7 +126,7 @@ def test_straight_rod_turns_rigidly():
 
 @pytest.mark.parametrize("mode", [1, 2])
 def test_small_bending_is_a_free_free_beam(mode):
-    """Euler-Bernoulli: cos(q l) cosh(q l) = 1, rho Omega^2 = K q^4, y = a shape(s) sin(Omega t)/Omega, order 2 in k and h at once."""
+    """Euler-Bernoulli: cos(q l) cosh(q l) = 1, rho Omega^2 = K q^4, y = a shape(s) sin(Omega t)/Omega."""
     low = (mode + 0.5) * np.pi
     z = brentq(lambda z: np.cos(z) - 1 / np.cosh(z), low - 0.5, low + 0.5)
     q = z / 3.7
