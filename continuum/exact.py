@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from continuum.dispersion import frequency, symbols
+from continuum.dispersion import frequency, growth, symbols
 from continuum.rod import Rod
 from discs import checks
 from discs.chain import ROLLING
@@ -151,6 +151,39 @@ def standing_wave(
     omega = float(frequency(rod, q, k))
     theta = checks.number("amplitude", amplitude) * shape(s)
     return Motion(s + 0 * t, rod.radius * theta * np.cos(omega * t), theta * np.cos(omega * t), -omega * theta * np.sin(omega * t))
+
+
+def growing_wave(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float, mode: int, amplitude: float, n: int | None = None) -> Motion:
+    r"""The growing wave of the straight rod that rolls sideways at the rate omega, field law, to first order in the amplitude.
+
+    Perturb `rolling_line` by (xi, eta, vartheta) e^{sigma t}. Rolling, r. = R theta. J r', asks for sigma xi = -R omega eta' and
+    sigma eta = R (sigma vartheta + omega xi'), hence with sigma of `dispersion.growth`, q = 2 pi mode/length and g = R omega q
+
+        vartheta = a cos(q s),   eta = b cos(q s),   xi = (g/sigma) b sin(q s),   b = R sigma^2/(sigma^2 - g^2) a.
+
+    (sigma < g: the dispersion relation is positive at sigma = g.) For n discs on a ring q -> sin(q k)/k in g.
+
+    Parameters
+    ----------
+    s, t : places (N,) and times (F,).
+    omega : not zero; without rolling nothing grows.
+    mode : waves around the closed rod, 1, 2, ...
+    n : number of discs, None for the field.
+
+    Raises
+    ------
+    ValueError : for a rod that this wave does not grow on.
+    """
+    s, t, omega = *_axes(s, t), checks.number("omega", omega)
+    q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
+    k = None if n is None else rod.length / checks.whole("n (discs of a ring)", n, 5)
+    sigma, g = float(growth(rod, q, omega, k=k)), rod.radius * omega * float(symbols(q, k).first)
+    if not sigma:
+        raise ValueError(f"wave {mode} does not grow at omega = {omega:g}; see standing_wave")
+    a = checks.number("amplitude", amplitude) * np.exp(sigma * t)
+    b, wave = rod.radius * sigma**2 / (sigma**2 - g**2) * a, np.cos(q * s)
+    line = rolling_line(rod, s[0], t[:, 0], omega)
+    return Motion(line.x + g / sigma * b * np.sin(q * s), line.y + b * wave, line.theta + a * wave, line.omega + sigma * a * wave)
 
 
 def _axes(s: ArrayLike, t: ArrayLike) -> tuple[NDArray, NDArray]:

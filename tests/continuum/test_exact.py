@@ -220,6 +220,33 @@ def test_standing_waves_that_are_not_there(rod, arguments, message):
         exact.standing_wave(untwisting_rod(**ROD | rod).rod, 0.0, 0.0, amplitude=1.0, **arguments)
 
 
+@pytest.mark.parametrize("mode", [1, 3])
+def test_growing_wave_of_the_chain_is_the_exact_twin(mode):
+    """Field law: all four fields, to first order in the amplitude, while the wave grows; that of the field at order 2 from it."""
+    rod, t = Rod(**ROD), np.array([0.0, 1.0, 2.0])
+    errors = []
+    for n in (32, 64, 128):
+
+        def initial(s, n=n):
+            return tuple(field[0] for field in exact.growing_wave(rod, s, 0.0, 1.3, mode, 1e-8, n))
+
+        scene = replace(rolling_rod(duration=2.0, **ROD), initial=initial)
+        run = simulate(lump(scene, n), FINE, 0.01, frames=t, progress=False)
+        twin, field = (exact.growing_wave(rod, run.s, run.t, 1.3, mode, 1e-8, m) for m in (n, None))
+        assert moved(run, twin) < 2e-12  # the square of 1e-7, and the step's error
+        errors.append(np.abs(twin.theta - field.theta).max())
+    assert np.ptp(run.theta[-1]) > 3 * np.ptp(run.theta[0])
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx(2.0, abs=0.2), orders
+
+
+@pytest.mark.parametrize("change", [{"omega": 0.0}, {"rod": Rod(**ROD | {"torsion_stiffness": 0.0}), "mode": 6}])
+def test_waves_that_do_not_grow(change):
+    given = {"rod": Rod(**ROD), "omega": 1.3, "mode": 1} | change
+    with pytest.raises(ValueError, match=r"wave \d does not grow at omega = "):
+        exact.growing_wave(s=0.0, t=0.0, amplitude=1.0, **given)
+
+
 THIN = ROD | {"radius": 0.0}
 
 
