@@ -25,16 +25,16 @@ FINE = Suzuki4(Midpoint(tolerance=1e-13))
 def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, duration: float = 1.0) -> NDArray:
     """Growth rates (modes,) of waves 1, 2, ... of n discs that roll sideways at the rate omega, from one simulation.
 
-    It starts from all waves at once, small enough to pass through each other: growing ones of the field under the field law, standing
-    ones under the unit law. A wave's size is that of its amplitude and rate, sqrt(|theta_m|^2 + |omega_m|^2/rate^2).
+    It starts from all waves at once, small enough to pass through each other: growing ones under the field law, standing ones
+    under the unit law. A wave's size is that of its amplitude and rate, sqrt(|theta_m|^2 + |omega_m|^2/rate^2).
     """
-    place = 1e-10 * 2.4 ** -np.arange(modes)  # steeper waves are smaller, so that slopes are alike
     waves = range(1, modes + 1)
 
     def initial(s: NDArray) -> tuple[NDArray, ...]:
         line = exact.rolling_line(rod, s, 0.0, omega)
         start = np.array(line)[:, 0]
-        for mode, size in zip(waves, place, strict=True):
+        for mode in waves:
+            size = 1e-9 / mode  # slopes are alike
             if rolling == "field":
                 wave = np.array(exact.growing_wave(rod, s, 0.0, omega, mode, size, n)) - line
             else:
@@ -77,7 +77,7 @@ def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: A
     return ax
 
 
-def fluxes(scene: Scene, n: int = 129, frames: int = 451) -> Figure:
+def fluxes(scene: Scene, n: int = 513, frames: int = 451) -> Figure:
     """Density of energy and its flux over s and t, from n discs."""
     run = simulate(semidiscretise(scene, n, "consistent"), "suzuki4", frames=frames, progress=False)
     law = balances(scene.rod, run, scene.rolling, scene.closed, scene.shift)["energy"]
