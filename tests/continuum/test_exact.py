@@ -9,6 +9,7 @@ from numpy.polynomial import Chebyshev
 from compare import lump
 from continuum import Rod, breathing_ring, exact, rolling_rod, solve, steered_rod, untwisting_rod
 from continuum.dispersion import frequency, growth
+from continuum.figures import dispersion, fluxes, measured_growth
 from continuum.mesh import semidiscretise
 from discs import Midpoint, Problem, Suzuki4, simulate
 
@@ -245,6 +246,22 @@ def test_waves_that_do_not_grow(change):
     given = {"rod": Rod(**ROD), "omega": 1.3, "mode": 1} | change
     with pytest.raises(ValueError, match=r"wave \d does not grow at omega = "):
         exact.growing_wave(s=0.0, t=0.0, amplitude=1.0, **given)
+
+
+def test_growth_measured_for_the_picture():
+    """All waves of one simulation grow as the relation of n discs says, and under the unit law not at all."""
+    rod, q = Rod(**ROD), 2 * np.pi * np.arange(1, 9) / 3.7
+    np.testing.assert_allclose(measured_growth(rod, 1.3, "field", 24, 8), growth(rod, q, 1.3, k=3.7 / 24), atol=1e-3)
+    np.testing.assert_allclose(measured_growth(rod, 1.3, "unit", 24, 8), 0, atol=1e-3)
+
+
+def test_pictures(tmp_path):
+    ax = dispersion(Rod(**ROD), n=16, modes=3)
+    np.testing.assert_allclose(ax.lines[0].get_ydata()[-1], growth(Rod(**ROD), 7 * np.pi / 3.7, 1.0))
+    figure = fluxes(untwisting_rod(duration=0.5, **ROD), n=17, frames=5)
+    for drawn in (ax.figure, figure):
+        drawn.savefig(tmp_path / "picture.png")
+        assert (tmp_path / "picture.png").stat().st_size > 10_000
 
 
 THIN = ROD | {"radius": 0.0}
