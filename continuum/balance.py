@@ -76,7 +76,8 @@ def balances(
 
     Returns
     -------
-    Balances by name, LAWS. Near free ends the rolling rod is not smooth, and nor are derivatives there.
+    Balances by name, LAWS. The rolling rod has a thin layer at free ends that splines do not see: derivatives in the last nodes
+    are of little worth, and a flux through an end is zero but for O(k).
 
     Raises
     ------

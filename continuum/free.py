@@ -57,9 +57,8 @@ class Banded:
         """The solution, (size,). Entries at one place add up."""
         shape = 2 * self._width + 1, right.size
         matrix = np.bincount(self._slots, entries, shape[0] * shape[1]).reshape(shape)
-        return solve_banded((self._width, self._width), matrix, right[self._order], overwrite_ab=True, check_finite=False)[
-            self._back
-        ]
+        both = self._width, self._width
+        return solve_banded(both, matrix, right[self._order], overwrite_ab=True, check_finite=False)[self._back]
 
 
 class FreeRod:

@@ -325,3 +325,23 @@ def test_radius_zero_needs_spin_inertia():
         bad = replace(problem.chain, radius=[0.7, 0.7, 0.0, 0.7, 0.7, 0.7], spin_inertia=0.0)
         with pytest.raises(ValueError, match=r"spin_inertia must be positive where .*radius = 0, as at disc 2; got 0"):
             Problem(bad, problem.initial, 1.0)
+
+
+def test_field_of_a_steered_rod_of_radius_zero():
+    """Spectral elements: the line stays, theta is the torsion wave."""
+    field = solve(steered_rod(duration=3.0, **THIN), 1e-6, frames=4, progress=False)
+    truth = exact.standing_wave(Rod(**THIN), field.s, field.t, 1, -np.pi / 2)
+    for name in ("x", "y", "theta"):
+        np.testing.assert_allclose(getattr(field, name), getattr(truth, name), atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["midpoint", "leapfrog", "rk4", "gauss4"])
+def test_any_method_takes_radius_zero(method):
+    """Order 2 or more on the torsion wave; only that nothing is divided by the radius is in question."""
+    run = simulate(lump(untwisting_rod(duration=1.0, **THIN), 9), method, 0.01, frames=2, progress=False, engine="plain")
+    k = 3.7 / 8
+    spin = Rod(**THIN)
+    wave = exact.standing_wave(spin, run.s, run.t, 1, -np.pi / 2, n=9)
+    tolerance = 1e-4 if method != "leapfrog" else 1e-3 * k
+    np.testing.assert_allclose(run.theta, wave.theta, atol=tolerance)
+    np.testing.assert_array_equal(run.y, 0)
