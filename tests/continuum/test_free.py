@@ -69,6 +69,14 @@ def test_what_the_step_keeps(closed):
     assert orders(swings) == pytest.approx(2.0, abs=0.1), swings
 
 
+def test_energy_does_not_drift():
+    """Over 1200 steps, several swings of the rod: no more in the second half than in the first, and no shift of the mean."""
+    energy = moving(17, 0.02, duration=24.0, frames=401).energy
+    first, second = energy[:200], energy[200:]
+    assert np.ptp(second) < 1.5 * np.ptp(first) < 1e-3 * energy[0]
+    assert abs(second.mean() - first.mean()) < 0.2 * np.ptp(first)
+
+
 def test_step_is_reversible():
     run = moving(34, 0.02)
     here = [np.array([getattr(run, name)[-1] for name in names]) for names in (("x", "y"), ("x_rate", "y_rate"))]
