@@ -1,7 +1,8 @@
 """The rod as a field: the paper's scheme, a solver with an error estimate, exact solutions, linear waves."""
 
+from continuum.free import free_rod
 from continuum.rod import Rod, Scene, SteeredRod
 from continuum.scenes import breathing_ring, rolling_rod, steered_rod, untwisting_rod
 from continuum.solver import solve
 
-__all__ = ["Rod", "Scene", "SteeredRod", "breathing_ring", "rolling_rod", "solve", "steered_rod", "untwisting_rod"]
+__all__ = ["Rod", "Scene", "SteeredRod", "breathing_ring", "free_rod", "rolling_rod", "solve", "steered_rod", "untwisting_rod"]

@@ -1,11 +1,14 @@
-"""Exact solutions."""
+"""Exact solutions, of the field and of n discs: breathing rings, the straight rod rolling, its standing waves at rest."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
+from continuum.dispersion import frequency, growth, symbols
 from continuum.rod import Rod
 from discs import checks
 from discs.chain import ROLLING
@@ -59,14 +62,17 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     b = 1 / a0**2 if n is None else (2 / k * np.sin(np.pi / n)) ** 2
     r, stiffness = rod.radius, rod.bending_stiffness * b**2
     if rolling == "unit":
-        nu = r * np.sqrt(stiffness / rod.inertia)
+        pull = r * stiffness / rod.inertia
+        nu = np.sqrt(r * pull)
         end = _collapse(a0, r * omega, nu)
         if t[-1] >= end:
             raise ValueError(f"the ring is a point at t = {end:g}; ask for earlier times")
         # sin(nu t)/nu, which is t for a rod that does not bend
         sine = t * np.sinc(nu * t / np.pi)
         a = a0 * np.cos(nu * t) - r * omega * sine
-        return Ring(a, (a0 - a) / r, a0 * nu**2 * sine / r + omega * np.cos(nu * t))
+        # (a_0 - a)/R, written so that R may be 0
+        theta = a0 * pull * t**2 / 2 * np.sinc(nu * t / (2 * np.pi)) ** 2 + omega * sine
+        return Ring(a, theta, a0 * pull * sine + omega * np.cos(nu * t))
 
     def rate(_: float, z: NDArray) -> list[float]:
         stretch = np.exp(-2 * r * g * z[0] / a0)
@@ -78,3 +84,144 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     solution = solve_ivp(rate, span, [0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14)
     theta, rate_of_roll = solution.y
     return Ring(a0 * np.exp(-r * g * theta / a0), theta, rate_of_roll)
+
+
+class Motion(NamedTuple):
+    """A rod's fields at times t (F,) and places s (N,): x, y (length), theta and its rate omega, all (F, N)."""
+
+    x: NDArray
+    y: NDArray
+    theta: NDArray
+    omega: NDArray
+
+
+def rolling_line(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float) -> Motion:
+    """The straight rod that rolls sideways at a constant rate: r = (s, R omega t), theta = omega t; for discs and both laws alike.
+
+    Nothing bends or twists, so (NHFE) leaves omega. = 0 and lambda = mu = 0.
+    """
+    s, t, omega = *_axes(s, t), checks.number("omega", omega)
+    theta = omega * t + 0 * s
+    return Motion(s + 0 * t, rod.radius * theta, theta, np.full_like(theta, omega))
+
+
+def standing_wave(
+    rod: Rod, s: ArrayLike, t: ArrayLike, mode: int, amplitude: float, closed: bool = False, n: int | None = None
+) -> Motion:
+    r"""A standing wave of the straight rod at rest: theta = amplitude g(s) cos(Omega t), r = (s, R theta).
+
+    Exact at any amplitude if R = 0, when the rod only twists; else to first order in the amplitude, under both laws, which agree
+    there: e = (-R y', R) to first order leaves x = s and y. = R theta.; (NHFE) becomes a beam under tension,
+
+        M theta.. = beta theta'' - K R^2 theta'''',   M = alpha + rho R^2.
+
+    closed : g = cos(q s), q = 2 pi mode/length, M Omega^2 = beta q^2 + K R^2 q^4 (`dispersion.frequency`).
+    free ends : theta'' = 0 and beta theta' = K R^2 theta'''. Of both the wave and what decays from the ends,
+
+        g = even: cos(q z)/(q^2 cos(q l/2)) + cosh(p z)/(p^2 cosh(p l/2)),   odd: the same of sin and sinh,   z = s - length/2,
+
+    with M Omega^2 = beta q^2 + K R^2 q^4 = K R^2 p^4 - beta p^2, so p^2 = q^2 + beta/(K R^2), and q the mode-th root of
+
+        even: p^3 tan(q l/2) + q^3 tanh(p l/2) = 0,   odd: q^3 tan(q l/2) = p^3 tanh(p l/2);
+
+    g is scaled to 1 at s = 0. If K R = 0, nothing decays and g = cos(pi mode s/l).
+
+    For n discs (plain springs, or a ring) read Q = (4/k^2) sin^2(q k/2), P = (4/k^2) sinh^2(p k/2) for q^2, p^2 and sin(q k)/k,
+    sinh(p k)/k for the single q, p of q^3 = q^4/q: the conditions of an end are that it does not bend, and that the shear forces
+    of the links to its two sides, one of them beyond the end, add up to 0.
+
+    Parameters
+    ----------
+    s : places, (N,); of discs, i k.
+    t : times, (F,).
+    mode : 1, 2, ...: waves around a closed rod, zeros of theta along a free one.
+    n : number of discs, None for the field.
+
+    Raises
+    ------
+    ValueError : for a mode that is not a whole number of at least 1, or that n discs do not have.
+    """
+    s, t = _axes(s, t)
+    mode = checks.whole("mode", mode, 1)
+    k = None if n is None else rod.length / (checks.whole("n (discs)", n, 5 if closed else 3) - (not closed))
+    most = mode if n is None else (n // 2 if closed else n - 1)
+    if mode > most:
+        raise ValueError(f"mode must be at most {most} for {n} discs; got {mode}")
+    q, shape = _shape(rod, 2 * mode if closed else mode, closed, k)
+    omega = float(frequency(rod, q, k))
+    theta = checks.number("amplitude", amplitude) * shape(s)
+    return Motion(s + 0 * t, rod.radius * theta * np.cos(omega * t), theta * np.cos(omega * t), -omega * theta * np.sin(omega * t))
+
+
+def growing_wave(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float, mode: int, amplitude: float, n: int | None = None) -> Motion:
+    r"""The growing wave of the straight rod that rolls sideways at the rate omega, field law, to first order in the amplitude.
+
+    Perturb `rolling_line` by (xi, eta, vartheta) e^{sigma t}. Rolling, r. = R theta. J r', asks for sigma xi = -R omega eta' and
+    sigma eta = R (sigma vartheta + omega xi'), hence with sigma of `dispersion.growth`, q = 2 pi mode/length and g = R omega q
+
+        vartheta = a cos(q s),   eta = b cos(q s),   xi = (g/sigma) b sin(q s),   b = R sigma^2/(sigma^2 - g^2) a.
+
+    (sigma < g: the dispersion relation is positive at sigma = g.) For n discs on a ring q -> sin(q k)/k in g.
+
+    Parameters
+    ----------
+    s, t : places (N,) and times (F,).
+    omega : not zero; without rolling nothing grows.
+    mode : waves around the closed rod, 1, 2, ...
+    n : number of discs, None for the field.
+
+    Raises
+    ------
+    ValueError : for a rod that this wave does not grow on.
+    """
+    s, t, omega = *_axes(s, t), checks.number("omega", omega)
+    q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
+    k = None if n is None else rod.length / checks.whole("n (discs of a ring)", n, 5)
+    sigma, g = float(growth(rod, q, omega, k=k)), rod.radius * omega * float(symbols(q, k).first)
+    if not sigma:
+        raise ValueError(f"wave {mode} does not grow at omega = {omega:g}; see standing_wave")
+    a = checks.number("amplitude", amplitude) * np.exp(sigma * t)
+    b, wave = rod.radius * sigma**2 / (sigma**2 - g**2) * a, np.cos(q * s)
+    line = rolling_line(rod, s[0], t[:, 0], omega)
+    return Motion(line.x + g / sigma * b * np.sin(q * s), line.y + b * wave, line.theta + a * wave, line.omega + sigma * a * wave)
+
+
+def _axes(s: ArrayLike, t: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Places (1, N) and times (F, 1)."""
+    return np.atleast_1d(np.asarray(s, dtype=float))[None, :], np.atleast_1d(np.asarray(t, dtype=float))[:, None]
+
+
+def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, Callable[[NDArray], NDArray]]:
+    """Wave number q and shape g of a standing wave; see `standing_wave`."""
+    length, bend = rod.length, rod.bending_stiffness * rod.radius**2
+    if closed or not bend:
+        q = np.pi * mode / length
+        return q, lambda s: np.cos(q * s)
+    if mode == 1 and not rod.torsion_stiffness:
+        raise ValueError("mode 1 with free ends needs a positive torsion_stiffness: without it the whole rod turns; got 0")
+    half, odd = length / 2, mode % 2 == 1
+
+    def ratios(q: float) -> tuple[float, float, float]:
+        """p, q^2/p^2 and q/p, or what stands for them with n discs."""
+        second, first = symbols(q, k)
+        square = second + rod.torsion_stiffness / bend
+        p = np.sqrt(square) if k is None else 2 / k * np.arcsinh(np.sqrt(square) * k / 2)
+        return float(p), float(second / square), float(first / (p if k is None else np.sinh(p * k) / k))
+
+    def end(q: float) -> float:
+        """The condition on q, without the poles of tan."""
+        p, second, first = ratios(q)
+        sin, cos, tanh = np.sin(q * half), np.cos(q * half), np.tanh(p * half)
+        return second**2 * sin - first * cos * tanh if odd else first * sin + second**2 * cos * tanh
+
+    q = brentq(end, max(mode - 1, 1e-6) * np.pi / length, mode * np.pi / length, xtol=1e-15, rtol=1e-14)
+    p, second, _ = ratios(q)
+
+    def g(s: NDArray) -> NDArray:
+        z, sign = s - half, -1.0 if odd else 1.0
+        wave = np.sin(q * z) / np.sin(q * half) if odd else np.cos(q * z) / np.cos(q * half)
+        # cosh(p z)/cosh(p l/2), or sinh, safe for large p
+        decaying = np.exp(p * (z - half)) + sign * np.exp(-p * (z + half))
+        return sign * (wave + second * decaying / (1 + sign * np.exp(-p * length))) / (1 + second)
+
+    return q, g

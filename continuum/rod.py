@@ -22,10 +22,10 @@ class Rod:
     ----------
     length : of the rod, > 0.
     density : rho, mass per length, > 0.
-    spin_inertia : alpha, moment of inertia about the discs' axle per length, >= 0.
+    spin_inertia : alpha, moment of inertia about the discs' axle per length, >= 0; > 0 if R = 0.
     torsion_stiffness : beta, >= 0.
     bending_stiffness : K, >= 0.
-    radius : R, of the discs, > 0.
+    radius : R, of the discs, >= 0. With R = 0 nothing rolls away: the centre line stays and theta obeys the wave equation.
     curvature : "linear", bending energy K |r''|**2/2, the paper's; "true", K phi'**2/2 with phi the direction of the line.
     stretch_stiffness : A, >= 0, adds A (|r'| - 1)**2/2; only with the true curvature.
 
@@ -44,8 +44,10 @@ class Rod:
     stretch_stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        _settle(self, ("length", "density", "radius"), positive=True)
-        _settle(self, ("spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness"))
+        _settle(self, ("length", "density"), positive=True)
+        _settle(self, ("radius", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness"))
+        if not self.inertia:
+            raise ValueError("spin_inertia must be positive where radius = 0; got 0 for both")
         self._check_law()
 
     def _check_law(self) -> None:

@@ -62,7 +62,7 @@ class Chain(Spaced):
     spin_inertia : alpha, moment of inertia about the axle per length, >= 0; a number or (n,).
     torsion_stiffness : beta >= 0; a number or one per link (n-1,), (n,) on a ring.
     bending_stiffness : K >= 0; a number or one per bend, (n-2,), (n,) on a ring and with consistent ends.
-    radius : R > 0; a number or (n,).
+    radius : R >= 0; a number or (n,). A disc of radius 0 keeps its place and only twists.
     rolling : "field" or "unit".
     curvature : "linear", bending energy K/2 |r''|**2, the paper's; "true", K/2 phi'**2 with phi the direction of the line,
         which does not see stretch. The ends carry no bend in the true law, whose natural condition is phi' = 0.
@@ -103,7 +103,7 @@ class Chain(Spaced):
             torsion_stiffness=(links, False),
             bending_stiffness=(stencils.bend_shares(n, 1.0, self._bend_ends).size, False),
             stretch_stiffness=(links, False),
-            radius=(n, True),
+            radius=(n, False),
         )
         if self.curvature == "linear" and np.any(self.stretch_stiffness):
             raise ValueError("stretch_stiffness goes with curvature='true'; with 'linear' it must be 0")
@@ -170,7 +170,7 @@ class SteeredChain(Spaced):
             shear_stiffness=(links, False),
             torsion_stiffness=(links, False),
             bending_stiffness=(links, False),
-            radius=(n, True),
+            radius=(n, False),
         )
         if isinstance(self.turns, bool) or not isinstance(self.turns, int):
             raise ValueError(f"turns must be a whole number; got {self.turns!r}")

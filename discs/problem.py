@@ -70,6 +70,8 @@ class Problem:
             raise ValueError(f"{type(self.chain).__name__} {need}")
         if isinstance(self.chain, Chain):
             self._check_slopes(self.chain)
+        else:
+            self._check_inertia(np.asarray(self.chain.radius) > 0, "radius = 0")
 
     def _check_slopes(self, chain: Chain) -> None:
         shape = self.system.shape(self._positions())
@@ -80,10 +82,14 @@ class Problem:
         if chain.curvature == "true" and not np.hypot(shape[0], shape[1]).all():
             i = int(np.argmin(np.hypot(shape[0], shape[1])))
             raise ValueError(f"curvature='true' needs links with a direction: discs {i} and {i + 1} are in one place")
-        inertia = np.asarray(chain.spin_inertia) + (slope > 0)
+        self._check_inertia((slope > 0) & (np.asarray(chain.radius) > 0), "r' = 0 or radius = 0")
+
+    def _check_inertia(self, moves: NDArray, where: str) -> None:
+        """Refuse discs that neither move when they roll nor have a moment of inertia."""
+        inertia = np.asarray(self.chain.spin_inertia) + moves
         if not inertia.all():
             i = int(np.argmin(inertia))
-            raise ValueError(f"spin_inertia must be positive where r' = 0, as at disc {i}; got 0")
+            raise ValueError(f"spin_inertia must be positive where {where}, as at disc {i}; got 0")
 
     @cached_property
     def system(self) -> RollingDiscs:

@@ -29,6 +29,7 @@ class Solution:
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
     contact_force : (F, 2, N), force (x, y) of the ground that keeps each disc rolling, the multiplier lambda, mass times length
         per time squared; want "contact_force".
+    tension : (F, n_links), the multiplier p in the links of a free rod, force; of `continuum.free_rod`.
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
     error_estimate : for a field, {"x", "y", "theta", "omega"} -> estimated largest error over nodes and frames.
     """
@@ -49,6 +50,7 @@ class Solution:
     slope_x: NDArray | None = None
     slope_y: NDArray | None = None
     contact_force: NDArray | None = None
+    tension: NDArray | None = None
     modified_energy: NDArray | None = None
     error_estimate: dict[str, float] | None = None
 

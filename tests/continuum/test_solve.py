@@ -150,7 +150,8 @@ def test_blow_up_of_the_explicit_scheme():
     [
         ({"length": -1}, "length must be a positive finite number; got -1"),
         ({"density": 0}, "density must be a positive"),
-        ({"radius": 0.0}, "radius must be a positive"),
+        ({"radius": -0.1}, "radius must be at least 0; got -0.1"),
+        ({"radius": 0.0, "spin_inertia": 0.0}, "spin_inertia must be positive where radius = 0; got 0 for both"),
         ({"spin_inertia": -1}, "spin_inertia must be at least 0; got -1"),
         ({"bending_stiffness": -0.7}, "bending_stiffness must be at least 0; got -0.7"),
         ({"torsion_stiffness": float("inf")}, "torsion_stiffness must be a finite number"),
@@ -198,7 +199,7 @@ def test_scene_files(tmp_path):
         ('scene = "flying_rod"', "scene must be one of 'untwisting_rod', .*; got 'flying_rod'"),
         ("rolling = 'unit'", "scene must be one of"),
         ("scene = 'untwisting_rod'\nmass = 3", "key of untwisting_rod must be one of"),
-        ("scene = 'untwisting_rod'\nradius = 'big'", "radius must be a positive finite number; got 'big'"),
+        ("scene = 'untwisting_rod'\nradius = 'big'", "radius must be a finite number; got 'big'"),
         ("scene = ", "is not TOML"),
     ]:
         path.write_text(text)

@@ -121,7 +121,7 @@ def test_fewer_sweeps_are_counted():
         ({"length": "long"}, "length must be a positive finite number; got 'long'"),
         ({"density": 0.0}, "density must be finite and greater than 0; got 0.0"),
         ({"density": np.ones(5)}, r"density must be a number or an array of shape \(8,\); got shape \(5,\)"),
-        ({"radius": -1.0}, "radius must be finite and greater than 0; got -1.0"),
+        ({"radius": -1.0}, "radius must be finite and at least 0; got -1.0"),
         ({"spin_inertia": -0.1}, "spin_inertia must be finite and at least 0"),
         ({"torsion_stiffness": -0.1}, "torsion_stiffness must be finite and at least 0"),
         ({"bending_stiffness": [1, 1, 1, -2, 1, 1]}, "bending_stiffness must be .* got -2.0 at place 3"),
@@ -172,7 +172,7 @@ def test_bad_states_and_problems_are_refused():
         Problem(chain, State(s, 0 * s, 0 * s), -1)
     with pytest.raises(ValueError, match=re.escape("rolling='unit' needs a heading: r' = 0 at disc 0")):
         Problem(Chain(**PARAMETERS | {"rolling": "unit"}), State(0 * s, 0 * s, 0 * s), 1.0)
-    with pytest.raises(ValueError, match=re.escape("spin_inertia must be positive where r' = 0, as at disc 0; got 0")):
+    with pytest.raises(ValueError, match=re.escape("spin_inertia must be positive where r' = 0 or radius = 0, as at disc 0")):
         Problem(Chain(**PARAMETERS | {"spin_inertia": 0.0}), State(0 * s, 0 * s, 0 * s), 1.0)
     with pytest.raises(ValueError, match="sweeps must be a whole number of at least 1"):
         Midpoint(sweeps=0)

@@ -1,0 +1,174 @@
+r"""Conservation laws, section 3.4 of the paper and its appendix: density, flux and source along a motion.
+
+With the contact force n = p r' - K r''' (p = 0 for the rolling rod), in one form for both rods,
+
+    rho r.. = n' + lambda,   alpha theta.. = beta theta'' - e . lambda,
+
+lambda = 0 for the free rod; for the rolling one r. = e theta., and lambda is the ground's force per length. Each symmetry of the
+Lagrangian gives d_t D + d_s F = S: multiply the equations by what the symmetry moves, a rate Q = (Q_r, Q_theta), and collect. The
+virtual work of the ground is the source, S = lambda . (Q_r - e Q_theta):
+
+| law               | Q            | density D                     | flux F                  | source S               |
+| ----------------- | ------------ | ----------------------------- | ----------------------- | ---------------------- |
+| energy            | (r., theta.) | T + V                         | -n.r. - K r''.r.'       | lambda.(r. - e theta.) |
+|                   |              |                               | - beta theta' theta.    |   = 0                  |
+| momentum_x, _y    | ((1, 0), 0)  | rho r.                        | -n                      | lambda                 |
+| theta_momentum    | (0, 1)       | alpha theta.                  | -beta theta'            | -e.lambda              |
+| angular_momentum  | (J r, 0)     | rho r x r.                    | -r x n - K r' x r''     | r x lambda             |
+| material_momentum | (r', theta') | rho r.r' + alpha theta.theta' | K r'.r''' - p - T - V   | lambda.(r' - e theta') |
+
+T = (rho |r.|^2 + alpha theta.^2)/2, V = (K |r''|^2 + beta theta'^2)/2, a x b = a_x b_y - a_y b_x. For example
+r x n' = (r x n)' - r' x n with r' x n = -(K r' x r'')', and p r'.r.' = 0 where there is a p. The paper's forms are J = D ds - F dt,
+up to a common sign; its angular momentum is printed with -K(x''y' + y''x') where -K(x''y' - y''x') follows. material_momentum, of
+s -> s + const, is not in the paper: the rod is homogeneous, so that it is a law of the free rod too.
+
+**Noether's condition** (NHnoether): a symmetry gives a conservation law of the rolling rod if its generator, contracted with the
+forms of the bundle (bundleF), is zero on the constraint: Q_r - e Q_theta = 0. That is rolling itself for the passing of time, and
+fails for the others: their laws are balances with the source, the nonholonomic momentum equation of the paper's conclusions.
+
+Derivatives in s are those of splines of degree 7 through the nodes; lambda is formed from x, y, theta, omega at one time, with
+omega. eliminated. Differences in time give d_t D, and the Q of the first row, so that its violation is measured.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+from continuum.rod import Rod, SteeredRod
+from discs import Solution, checks
+from discs.chain import ROLLING
+
+DEGREE = 7
+LAWS = ("energy", "momentum_x", "momentum_y", "theta_momentum", "angular_momentum", "material_momentum")
+
+
+class Balance(NamedTuple):
+    """One law along a motion: d_t density + d_s flux = source, and how far Noether's condition is from holding.
+
+    density, flux, source : (F, N).
+    violation : (F, N), |Q_r - e Q_theta|; zero for the free rod.
+    residual : (F - 2, N), d_t density + d_s flux - source at all frames but the first and last, d_t by differences.
+    unforced : (F - 2, N), the same without the source.
+    """
+
+    density: NDArray
+    flux: NDArray
+    source: NDArray
+    violation: NDArray
+    residual: NDArray
+    unforced: NDArray
+
+
+def balances(
+    rod: Rod, run: Solution, rolling: str | None, closed: bool = False, shift: tuple[float, float] = (0.0, 0.0)
+) -> dict[str, Balance]:
+    """All laws along a motion of the rod.
+
+    Parameters
+    ----------
+    rod : with linear curvature.
+    run : from `solve` or `simulate`, or from `free_rod`; at least 8 nodes, and 3 frames near to each other: the error of d_t is of
+        the order of their distance squared.
+    rolling : "field" or "unit", or None for the free rod.
+    closed, shift : of the scene.
+
+    Returns
+    -------
+    Balances by name, LAWS. The rolling rod has a thin layer at free ends that splines do not see: derivatives in the last nodes
+    are of little worth, and a flux through an end is zero but for O(k).
+
+    Raises
+    ------
+    ValueError : for another bending law, too few frames or nodes, or a free rod's motion without velocities and tension.
+    """
+    if isinstance(rod, SteeredRod) or not isinstance(rod, Rod) or rod.curvature != "linear":
+        raise ValueError(f"balances are those of a Rod with curvature='linear'; got {rod!r}")
+    frames, nodes = run.x.shape
+    if frames < 3 or nodes <= DEGREE:
+        raise ValueError(f"balances need at least 3 frames and {DEGREE + 1} nodes; got {frames} and {nodes}")
+
+    period, advance = rod.length if closed else None, np.asarray(shift)[:, None, None]
+
+    def along(values: NDArray, order: int = 1) -> NDArray:
+        return _spline(run.s, values, period).derivative(order)(run.s)
+
+    def in_time(values: NDArray) -> NDArray:
+        return np.gradient(values, run.t, axis=-2, edge_order=2)
+
+    r, theta1, omega = np.stack([run.x, run.y]), along(run.theta), run.omega
+    r1, r2, r3, r4 = (along(r - advance * run.s / rod.length, order) for order in (1, 2, 3, 4))
+    r1 += advance / rod.length
+    rho, alpha, beta, bend = rod.density, rod.spin_inertia, rod.torsion_stiffness, rod.bending_stiffness
+    if rolling is None:
+        if run.x_rate is None or run.y_rate is None or run.tension is None:
+            raise ValueError("rolling=None is for the free rod, whose motion has x_rate, y_rate and tension")
+        v, p = np.stack([run.x_rate, run.y_rate]), _at_nodes(run.s, run.tension, period)
+        e = force = np.zeros_like(r)
+    else:
+        checks.choice("rolling", rolling, ROLLING)
+        size = np.hypot(*r1) if rolling == "unit" else 1.0
+        e, p = rod.radius * _turned(r1) / size, np.zeros_like(omega)
+        v = e * omega
+        tangent = along(v)
+        if rolling == "unit":  # only the part across r' turns the heading
+            tangent = (tangent - r1 * (_dot(r1, tangent) / size**2)) / size
+        e_rate = rod.radius * _turned(tangent)
+        torque = beta * along(run.theta, 2) - bend * _dot(e, r4) - rho * omega * _dot(e, e_rate)
+        force = rho * (e * torque / (alpha + rho * _dot(e, e)) + e_rate * omega) + bend * r4
+    n = p * r1 - bend * r3
+    kinetic, elastic = rho * _dot(v, v) + alpha * omega**2, bend * _dot(r2, r2) + beta * theta1**2
+    energy, material = 0.5 * (kinetic + elastic), rho * _dot(v, r1) + alpha * omega * theta1
+    ones, none = np.ones_like(omega), np.zeros_like(omega)
+    laws = {
+        "energy": (in_time(r), in_time(run.theta), energy, -(_dot(n, v) + bend * _dot(r2, along(v)) + beta * theta1 * omega)),
+        "momentum_x": ((ones, none), none, rho * v[0], -n[0]),
+        "momentum_y": ((none, ones), none, rho * v[1], -n[1]),
+        "theta_momentum": ((none, none), ones, alpha * omega, -beta * theta1),
+        "angular_momentum": (_turned(r), none, rho * _cross(r, v), -_cross(r, n) - bend * _cross(r1, r2)),
+        "material_momentum": (r1, theta1, material, bend * _dot(r1, r3) - p - energy),
+    }
+    found = {}
+    for name, (move, turn, density, flux) in laws.items():
+        slip = np.zeros_like(r) if rolling is None else np.asarray(move) - e * turn
+        source = _dot(force, slip)
+        # r x n is not periodic where r advances
+        around = None if name == "angular_momentum" and advance.any() else period
+        unforced = (in_time(density) + _spline(run.s, flux, around).derivative()(run.s))[1:-1]
+        found[name] = Balance(density, flux, source, np.hypot(*slip), unforced - source[1:-1], unforced)
+    return found
+
+
+def noether(found: dict[str, Balance]) -> dict[str, float]:
+    """Largest violation of Noether's condition along a motion by law; a law without one is a conservation law."""
+    return {name: float(law.violation.max()) for name, law in found.items()}
+
+
+def _dot(a: NDArray, b: NDArray) -> NDArray:
+    return (a * b).sum(axis=0)
+
+
+def _cross(a: NDArray, b: NDArray) -> NDArray:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _turned(a: NDArray) -> NDArray:
+    """J a."""
+    return np.stack([-a[1], a[0]])
+
+
+def _spline(s: NDArray, values: NDArray, period: float | None) -> BSpline:
+    """Spline of degree 7 through values (..., N), periodic if there is a period."""
+    if period is None:
+        return make_interp_spline(s, values, DEGREE, axis=-1)
+    around = np.concatenate([values, values[..., :1]], axis=-1)
+    return make_interp_spline(np.append(s, s[0] + period), around, DEGREE, bc_type="periodic", axis=-1)
+
+
+def _at_nodes(s: NDArray, tension: NDArray, period: float | None) -> NDArray:
+    """Tension of links at the nodes, (F, N); it is zero at free ends."""
+    middle = s[: tension.shape[1]] + s[1] / 2
+    if period is not None:
+        return _spline(middle, tension, period)(s)
+    return _spline(np.concatenate([s[:1], middle, s[-1:]]), np.pad(tension, ((0, 0), (1, 1))), None)(s)

@@ -1,0 +1,106 @@
+"""Pictures of the field alone: `python -m continuum.figures docs/images` draws both. Nothing opens a window."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from continuum import exact
+from continuum.balance import balances
+from continuum.dispersion import frequency, growth
+from continuum.mesh import semidiscretise
+from continuum.rod import Rod, Scene
+from continuum.scenes import rolling_rod, untwisting_rod
+from discs import Midpoint, Suzuki4, simulate
+
+# Okabe and Ito's colours, distinct for colour-blind readers
+BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
+FINE = Suzuki4(Midpoint(tolerance=1e-13))
+
+
+def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, duration: float = 1.0) -> NDArray:
+    """Growth rates (modes,) of waves 1, 2, ... of n discs that roll sideways at the rate omega, from one simulation.
+
+    It starts from all waves at once, small enough to pass through each other: growing ones under the field law, standing ones
+    under the unit law. A wave's size is that of its amplitude and rate, sqrt(|theta_m|^2 + |omega_m|^2/rate^2).
+    """
+    waves = range(1, modes + 1)
+
+    def initial(s: NDArray) -> tuple[NDArray, ...]:
+        line = exact.rolling_line(rod, s, 0.0, omega)
+        start = np.array(line)[:, 0]
+        for mode in waves:
+            size = 1e-9 / mode  # slopes are alike
+            if rolling == "field":
+                wave = np.array(exact.growing_wave(rod, s, 0.0, omega, mode, size, n)) - line
+            else:
+                wave = np.array(exact.standing_wave(rod, s, 0.0, mode, size, closed=True, n=n)) - exact.rolling_line(
+                    rod, s, 0.0, 0.0
+                )
+            start += wave[:, 0]
+        return tuple(start)
+
+    scene = replace(rolling_rod(rolling, duration=duration), rod=rod, initial=initial, shift=(rod.length, 0.0))
+    run = simulate(semidiscretise(scene, n, "ring"), FINE, duration / 200, frames=2, progress=False)
+    theta, rate = (np.abs(np.fft.rfft(values, axis=1)[:, 1 : modes + 1]) for values in (run.theta, run.omega))
+    if rolling == "field":
+        return np.log(theta[1] / theta[0]) / duration
+    own = frequency(rod, 2 * np.pi * np.arange(1, modes + 1) / rod.length, rod.length / n)
+    size = np.hypot(theta, rate / own)
+    return np.log(size[1] / size[0]) / duration
+
+
+def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: Axes | None = None) -> Axes:
+    """Growth rate against wave number of the straight rolling rod, field and n discs, both laws; measured rates as points."""
+    ax = Figure(figsize=(6.8, 4.6), layout="constrained").subplots() if ax is None else ax
+    most = 2 * np.pi * (modes + 0.5) / rod.length
+    q, k = np.linspace(1e-3, most, 400), rod.length / n
+    at = 2 * np.pi * np.arange(1, modes + 1) / rod.length
+    ax.plot(q, growth(rod, q, omega), color=BLUE, label="field law, field")
+    ax.plot(q, growth(rod, q, omega, k=k), color=ORANGE, linestyle="--", label=f"field law, {n} discs")
+    ax.plot(at, measured_growth(rod, omega, "field", n, modes), "o", color=ORANGE, markersize=5, label=f"measured, {n} discs")
+    ax.plot(q, growth(rod, q, omega, "unit"), color=GREEN, label="unit law, field and discs: 0")
+    ax.plot(at, measured_growth(rod, omega, "unit", n, modes), "s", color=GREEN, markersize=5, label=f"measured, {n} discs")
+    limit = omega * np.sqrt(rod.torsion_stiffness / rod.bending_stiffness)
+    ax.axhline(limit, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
+    ax.text(most, limit, "ω₀√(β/K)", color=GREY, ha="right", va="bottom")
+    ax.set_xlabel("wave number q (1/length)")
+    ax.set_ylabel("growth rate σ (1/time)")
+    ax.set_title(f"The straight rod rolling at ω₀ = {omega:g}")
+    ax.set_ylim(-0.05 * limit, 1.15 * limit)
+    ax.legend(fontsize=8)
+    ax.grid(alpha=0.3)
+    return ax
+
+
+def fluxes(scene: Scene, n: int = 513, frames: int = 451) -> Figure:
+    """Density of energy and its flux over s and t, from n discs."""
+    run = simulate(semidiscretise(scene, n, "consistent"), "suzuki4", frames=frames, progress=False)
+    law = balances(scene.rod, run, scene.rolling, scene.closed, scene.shift)["energy"]
+    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    parts = ((left, law.density, "density", "viridis", 0.0), (right, law.flux, "flux, towards larger s", "RdBu_r", None))
+    for ax, values, name, colours, low in parts:
+        high = np.quantile(np.abs(values), 0.995)
+        image = ax.pcolormesh(run.s, run.t, values, cmap=colours, vmin=-high if low is None else low, vmax=high, rasterized=True)
+        figure.colorbar(image, ax=ax, extend="max" if low is not None else "both")
+        ax.set_xlabel("s")
+        ax.set_title(f"Energy: {name}")
+    left.set_ylabel("t")
+    figure.suptitle(f"{scene.name}, {scene.rolling} law", fontsize=10)
+    return figure
+
+
+def main(folder: str) -> None:
+    """Draw both pictures of docs/continuum.md."""
+    path = Path(folder)
+    fluxes(untwisting_rod()).savefig(path / "fluxes.png", dpi=150)
+    dispersion(untwisting_rod().rod).figure.savefig(path / "dispersion.png", dpi=150)  # type: ignore[union-attr]
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
