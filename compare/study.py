@@ -94,7 +94,7 @@ def convergence(
     n : numbers of discs, increasing, at least one.
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame, at the end of the scene, counts.
-    dt : time step of the chains; None takes that of the field, whose effect is part of its error estimate, or duration/300.
+    dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
     method : integrator of the chains.
     """
     sizes, problems = checked_sizes(scene, n, ends)
@@ -104,7 +104,7 @@ def convergence(
         raise ValueError(
             f"field must be solve(scene, tol) of this scene up to t = {scene.duration:g}, with an error estimate; got {field!r}"
         )
-    h = field.stats["dt"] or scene.duration / 300 if dt is None else checks.number("dt", dt, positive=True)
+    h = scene.duration / max(300, 8 * field.stats.get("steps", 0)) if dt is None else checks.number("dt", dt, positive=True)
     fields = compared(scene)
     limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in fields}
     error = np.empty((len(problems), len(fields)))

@@ -10,6 +10,7 @@ from tqdm import tqdm
 from continuum.elements import solve_elements
 from continuum.mesh import semidiscretise
 from continuum.rod import Scene
+from continuum.spectral import solve_spectral
 from discs import Midpoint, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.simulation import frame_times
 
@@ -30,6 +31,9 @@ def solve(
 ) -> Solution:
     """The fields of a scene.
 
+    "spectral": Galerkin's method with polynomials, or Fourier series if the scene is closed, refined until it no longer
+    matters; see `continuum.spectral`. For slaved headings and linear curvature.
+
     "richardson": second-order differences in s on meshes of spacing k, k/2, k/4, ...; two neighbours u_k, u_{k/2} give
     T = u_{k/2} + (u_{k/2} - u_k)/3, which removes the k^2 term, and two neighbouring T the estimate of what is left,
     |T_{k/2} - T_k|/3. (The estimate presumes that the rest falls no slower than k^2. The rod's ends are not smooth - the
@@ -47,7 +51,7 @@ def solve(
     ----------
     scene : what to solve.
     tol : largest error wanted in x, y (length), theta and phi (rad) over nodes and frames; not of "leapfrog".
-    method : "richardson" or "leapfrog"; "elements" for headings of their own. The first that fits by default.
+    method : "spectral", "richardson" or "leapfrog"; "elements" for headings of their own. The first that fits by default.
     n, dt : points and step of "leapfrog"; the step is below k^2/8 where that would be unstable.
     frames : number of frames, equally spaced over the duration with both ends, or their times.
     progress : show progress on anything that takes over a second.
@@ -58,13 +62,14 @@ def solve(
 
     Raises
     ------
-    ValueError : for a bad tolerance, method or mesh, and when the tolerance is not reached on the finest mesh, 8193 nodes, or in
-        102 400 time steps.
+    ValueError : for a bad tolerance, method or mesh, and when the tolerance is not reached with the most functions or nodes and
+        steps that the method tries.
     SimulationError : when the motion cannot go on; see `discs.simulate`.
     """
-    if method is None:
-        method = "elements" if scene.steered else "richardson"
-    checks.choice("method", method, ("elements",) if scene.steered else ("richardson", "leapfrog"))
+    fitting = ("elements",) if scene.steered else ("richardson", "leapfrog")
+    if scene.rod.curvature == "linear" and not scene.steered:
+        fitting = ("spectral", *fitting)
+    method = fitting[0] if method is None else checks.choice("method", method, fitting)
     if method == "leapfrog":
         problem = semidiscretise(scene, 32 if n is None else n, ends="paper")
         step = min(problem.chain.k**2 / 8, suggest_dt(problem, "leapfrog")) if dt is None else dt
@@ -72,9 +77,11 @@ def solve(
         return simulate(problem, "leapfrog", dt=step, frames=frames, want=want, progress=progress)
     if n is not None or dt is not None:
         raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
-    if scene.steered:
-        return solve_elements(scene, checks.number("tol", tol, positive=True), frame_times(frames, scene.duration), progress)
-    return _richardson(scene, checks.number("tol", tol, positive=True), frames, progress)
+    tol = checks.number("tol", tol, positive=True)
+    if method in ("elements", "spectral"):
+        solver = solve_elements if method == "elements" else solve_spectral
+        return solver(scene, tol, frame_times(frames, scene.duration), progress)
+    return _richardson(scene, tol, frames, progress)
 
 
 def _richardson(scene: Scene, tol: float, frames: int | ArrayLike, progress: bool) -> Solution:

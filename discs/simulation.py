@@ -79,10 +79,7 @@ def simulate(
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
-    # the number of whole steps before a frame; a frame within rounding of a step is taken at the step
-    before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
-    after = np.where(times - before * h > 1e-9 * h, times - before * h, 0.0)
-
+    before, after = schedule(times, h)
     rows: dict[str, Any] = {}
     started = clock.perf_counter()
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), Progress(integrator.name, before[-1], progress) as shown:
@@ -153,6 +150,13 @@ def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:
         raise ValueError(f"want must be names of quantities; got {want!r}")
     given = (want,) if isinstance(want, str) else tuple(want)
     return tuple(checks.choice("want", name, (*WANTS, *integrator.offers)) for name in given)
+
+
+def schedule(times: NDArray, h: float) -> tuple[NDArray, NDArray]:
+    """Whole steps before each frame, and the rest of the way; a frame within rounding of a step is taken at the step."""
+    before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
+    rest = times - before * h
+    return before, np.where(rest > 1e-9 * h, rest, 0.0)
 
 
 def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:

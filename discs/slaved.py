@@ -43,7 +43,8 @@ class SlavedSystem(RollingDiscs):
         self._radius = np.asarray(chain.radius)
         mass = chain.w * np.asarray(chain.density)
         self.weights = np.array([mass, mass, chain.w * np.asarray(chain.spin_inertia)])
-        point = np.max(self._radius**2 / (np.asarray(chain.spin_inertia) + np.asarray(chain.density) * self._radius**2))
+        inertia = np.asarray(chain.spin_inertia) + np.asarray(chain.density) * self._radius**2
+        point = np.max(self._radius**2 / np.maximum(inertia, 1e-300))
         self.stiffest = 4 * float(np.max(chain.bending_stiffness) * point) / chain.k**4
         slope = stencils.slope_matrix(n, chain.k, ends)
         self._slope = sp.csr_array(sp.block_diag([slope, slope]))

@@ -99,6 +99,20 @@ class SkewGradient(ABC):
     def _no_step(self) -> NDArray:
         return np.zeros((len(self.rows), self.n))
 
+    # Several configurations, the stages of a step; here one after the other, a system may take them at once
+
+    def frames(self, shape: Any, moves: NDArray) -> Any:
+        """C after each of `moves` (stages, rows, n)."""
+        return [self.frame(self.moved(shape, move)) for move in moves]
+
+    def forwards(self, frames: Any, p: NDArray) -> NDArray:
+        """C p of each, (stages, rows, n)."""
+        return np.array([self.forward(c, stage) for c, stage in zip(frames, p, strict=True)])
+
+    def forces(self, frames: Any, shape: Any, moves: NDArray) -> NDArray:
+        """C^T grad V after each of `moves`, of the shape of p."""
+        return np.array([self.back(c, self.gradient(self.moved(shape, m))) for c, m in zip(frames, moves, strict=True)])
+
 
 class RollingDiscs(SkewGradient):
     """The equations of motion of a chain. A frame is the entries of C, (rows, n).

@@ -91,30 +91,33 @@ class Gauss(OneStep, ABC):
         p = np.array([z.pi] * self.stages)
         v = np.array([system.forward(common, stage) for stage in p])
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
-            c = [system.frame(system.moved(shape, move)) for move in h * np.tensordot(a, v, 1)]
-            v = np.array([system.forward(*pair) for pair in zip(c, p, strict=True)])
-            moves = h * np.tensordot(a, v, 1)
-            force = [system.back(f, system.gradient(system.moved(shape, m))) for f, m in zip(c, moves, strict=True)]
-            rest = z.pi - p - h * np.tensordot(a, np.array(force), 1)
+            c = system.frames(shape, h * _mix(a, v))
+            force = system.forces(c, shape, h * _mix(a, system.forwards(c, p)))
+            rest = z.pi - p - h * _mix(a, force)
             change = np.zeros_like(p)
             for value, into, out in parts:
-                part = system.solve(secant, common, h * h * value**2, np.tensordot(into, rest, 1))
+                part = system.solve(secant, common, h * h * value**2, _mix(into, rest))
                 change += np.multiply.outer(out, part).real
             p = p + change
-            v = np.array([system.forward(*pair) for pair in zip(c, p, strict=True)])
+            v = system.forwards(c, p)
             moved = np.abs([0.5 * h * system.forward(common, stage) for stage in change]).max(axis=(0, 2))
             if (moved <= self.tolerance * system.scale).all():
                 break
         work.gradients += sweep * self.stages
         work.solves += sweep * len(parts)
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
-        return Phase(*add(z.hi, z.lo, h * np.tensordot(b, v, 1)), z.pi + np.tensordot(last, p - z.pi, 1))
+        return Phase(*add(z.hi, z.lo, h * _mix(b, v)), z.pi + _mix(last, p - z.pi))
 
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
         from discs.kernels import methods
 
         coefficients = tuple(tableau(self.stages))
         return methods.gauss(chain, hi, lo, pi, coefficients, h, steps, self.sweeps, float(self.tolerance), bound)
+
+
+def _mix(weights: NDArray, stages: NDArray) -> NDArray:
+    """Sums of stages (s, ...) with weights (s,) or (m, s)."""
+    return (weights @ stages.reshape(len(stages), -1)).reshape(*weights.shape[:-1], *stages.shape[1:])
 
 
 class Gauss4(Gauss):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 from scipy.interpolate import CubicSpline
 
 from continuum import Rod, Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
@@ -57,13 +58,13 @@ def test_field_is_the_limit_of_plain_springs_too(paper_field):
 
 
 def test_energy_of_the_field_is_constant(paper_field):
-    """pi^4/80, at all frames, from the fields themselves by splines and the trapezoidal rule; unit masses, R = 1."""
+    """pi^4/80, at all frames, from the fields themselves by splines and Simpson's rule; unit masses, R = 1."""
     for f in range(3):
         x, y, theta = (CubicSpline(paper_field.s, getattr(paper_field, name)[f]) for name in ("x", "y", "theta"))
         s = paper_field.s
         kinetic = (1 + x(s, 1) ** 2 + y(s, 1) ** 2) * paper_field.omega[f] ** 2 / 2
         potential = 0.8 * theta(s, 1) ** 2 / 2 + 0.7 * (x(s, 2) ** 2 + y(s, 2) ** 2) / 2
-        assert np.trapezoid(kinetic + potential, s) == pytest.approx(np.pi**4 / 80, rel=1e-4)
+        assert simpson(kinetic + potential, x=s) == pytest.approx(np.pi**4 / 80, rel=1e-4)
 
 
 @pytest.mark.parametrize("mode", [3, 12])
@@ -110,7 +111,7 @@ def test_closed_rod_keeps_its_shift():
     ("arguments", "message"),
     [
         ({"tol": 0.0}, "tol must be a positive finite number; got 0.0"),
-        ({"method": "magic"}, "method must be one of 'richardson', 'leapfrog'; got 'magic'"),
+        ({"method": "magic"}, "method must be one of 'spectral', 'richardson', 'leapfrog'; got 'magic'"),
         ({"n": 32}, "n and dt belong to method='leapfrog'"),
         ({"dt": 0.1}, "n and dt belong to method='leapfrog'"),
         ({"method": "leapfrog", "dt": 0.0}, "dt must be a positive"),
@@ -125,13 +126,17 @@ def test_bad_solves_are_refused(arguments, message):
 def test_unreachable_tolerance_is_refused(monkeypatch):
     monkeypatch.setattr("continuum.solver.FINEST", 129)
     with pytest.raises(ValueError, match=r"tol = 1e-06 is not reached on 129 nodes, where the estimated error is"):
+        solve(untwisting_rod(), 1e-6, "richardson", progress=False)
+    monkeypatch.setattr("continuum.spectral.SIZES", (13, 17, 21))
+    with pytest.raises(ValueError, match=r"tol = 1e-06 is not reached on 21 functions, where the estimated error is"):
         solve(untwisting_rod(), 1e-6, progress=False)
 
 
 def test_motion_too_sensitive_for_its_tolerance(monkeypatch):
-    monkeypatch.setattr("continuum.solver.MOST_STEPS", 100)
-    with pytest.raises(ValueError, match=r"tol = 1e-07 is not reached in 100 time steps.*larger tol or a shorter duration"):
-        solve(untwisting_rod(), 1e-7, progress=False)
+    for module, method in (("solver", "richardson"), ("spectral", "spectral")):
+        monkeypatch.setattr(f"continuum.{module}.MOST_STEPS", 50)
+        with pytest.raises(ValueError, match=r"tol.* is not reached in 50 time steps.*larger tol or a shorter duration"):
+            solve(untwisting_rod(), 1e-7, method, progress=False)
 
 
 def test_explicit_scheme_of_the_true_curvature():

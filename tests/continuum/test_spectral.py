@@ -1,0 +1,162 @@
+"""Galerkin's method for slaved headings: its functions, its tolerance, against exact rings and against chains of discs."""
+
+import numpy as np
+import pytest
+
+from continuum import Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
+from continuum.bases import polynomials, waves
+from continuum.spectral import SpectralRod
+from discs import Gauss6, Gauss8, SimulationError
+from discs.integrators.base import Work
+
+UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
+POSITIONS = ("x", "y", "theta")
+
+
+@pytest.mark.parametrize("make", [polynomials, waves])
+def test_functions(make):
+    """Values, derivatives and integrals of a function that each basis holds exactly."""
+    n, length = 15, 3.0
+    basis, s = make(n, length), np.linspace(0, 2.9, 7)
+    q = 2 * np.pi / length
+
+    def f(s, m):
+        if make is waves:
+            return np.real((2j * q) ** m * np.exp(2j * q * s)) + 0.3 * (m == 0)
+        return (
+            np.polynomial.Polynomial([0.3, 1, -0.4, 0.2, 0.1]).deriv(m)(s) if m else 0.3 + s - 0.4 * s**2 + 0.2 * s**3 + 0.1 * s**4
+        )
+
+    a = basis.fit @ f(basis.s, 0)
+    np.testing.assert_allclose(basis.line(s) @ a, f(s, 0), atol=1e-12)
+    np.testing.assert_allclose(basis.field(s) @ f(basis.s, 0), f(s, 0), atol=1e-12)
+    np.testing.assert_allclose(basis.bends[:n] @ a, f(basis.s, 1), atol=1e-11)
+    slope, bend, bent = (basis.bends[n:] @ a).reshape(3, -1)  # a has nothing of the highest functions
+    value, rate, second = (basis.rates @ f(basis.s, 0)).reshape(3, -1)
+    np.testing.assert_allclose(slope, rate, atol=1e-11)
+    np.testing.assert_allclose(bend, second, atol=1e-10)
+    assert value.size == bent.size == basis.project.shape[1] - n
+    moves = np.concatenate([second, f(basis.s, 0)])
+    np.testing.assert_allclose(basis.project @ moves, a, atol=1e-11)
+    fine = np.linspace(0, length, 20001)
+    assert basis.bending @ a**2 == pytest.approx(np.trapezoid(f(fine, 2) ** 2, fine), rel=1e-6)
+    nodal = f(basis.s, 0)
+    assert nodal @ basis.torsion @ nodal == pytest.approx(np.trapezoid(f(fine, 1) ** 2, fine), rel=1e-6)
+    assert basis.w @ nodal == pytest.approx(np.trapezoid(f(fine, 0), fine), rel=1e-7)
+
+
+def followed(scene, n, steps):
+    """The rod on n functions, and its state at the end."""
+    rod, method = SpectralRod(scene, n), Gauss8(tolerance=1e-13)
+    z = rod.start(scene)
+    for _ in range(steps):
+        z = method.step(rod, z, scene.duration / steps, Work())
+    return rod, z
+
+
+def scenes():
+    yield "free", untwisting_rod(**UNEVEN, duration=1.0)
+    yield "free unit", untwisting_rod("unit", **UNEVEN, duration=1.0)
+    yield "ring", breathing_ring(duration=0.5, radius=0.7)
+    yield "shifted", rolling_rod(amplitude=0.02, duration=1.0)
+
+
+@pytest.mark.parametrize(("name", "scene"), [pytest.param(*pair, id=pair[0]) for pair in scenes()])
+def test_skew_gradient_and_energy(name, scene):
+    """C^T is the transpose of C, several configurations at once are the same as one by one, and energy is constant."""
+    rod = SpectralRod(scene, 21)
+    z = rod.start(scene)
+    rng = np.random.default_rng(4)
+    q = z.hi + 0.01 * rng.standard_normal(z.hi.shape) / (1 + np.arange(21)) ** 4
+    c, p, g = rod.frame(q), rng.standard_normal(21), rng.standard_normal((3, 21))
+    assert np.vdot(g, rod.forward(c, p)) == pytest.approx(rod.back(c, g) @ p, rel=1e-10)
+    step = 1e-6 * rng.standard_normal(q.shape)
+    change = rod.potential(q + step) - rod.potential(q - step)
+    assert change == pytest.approx(2 * np.vdot(rod.gradient(q), step), rel=1e-6, abs=1e-12)
+    moves = 1e-3 * rng.standard_normal((3, *q.shape)) / (1 + np.arange(21)) ** 4
+    several, one = rod.frames(q, moves), [rod.frame(q + move) for move in moves]
+    ps = rng.standard_normal((3, 21))
+    np.testing.assert_allclose(rod.forwards(several, ps), [rod.forward(*pair) for pair in zip(one, ps, strict=True)], atol=1e-11)
+    stiff = np.array([rod.back(c, rod.gradient(rod.forward(c, unit)) - rod.gradient(np.zeros_like(q))) for unit in np.eye(21)])
+    np.testing.assert_allclose(rod.solve(q, c, 0.01, p + 0.01 * stiff @ p), p, atol=1e-9)
+
+    begun, work, method = rod.energy(z), Work(), Gauss6(tolerance=1e-12)
+    for _ in range(20):
+        z = method.step(rod, z, scene.duration / 20, work)
+    assert rod.energy(z) == pytest.approx(begun, rel=1e-11)
+    assert work.unconverged == 0
+
+
+@pytest.mark.parametrize("parameters", [{}, UNEVEN | {"duration": 2.5}])
+def test_tolerance_is_met_and_the_estimate_is_honest(rolling, parameters):
+    """Against 77 functions and 400 steps, off by about 2e-9: true error below tol, estimate within a factor of 5 of it."""
+    scene = untwisting_rod(rolling, **parameters)
+    rod, z = followed(scene, 77, 400)
+    for tol in (1e-3, 1e-4, 1e-5, 1e-6):
+        field = solve(scene, tol, frames=1, progress=False)
+        truth = rod.at(z, field.s)
+        error = max(np.abs(getattr(field, name)[-1] - truth[name]).max() for name in POSITIONS)
+        estimate = max(field.error_estimate[name] for name in POSITIONS)
+        assert error <= tol, (tol, error)
+        assert error / 5 <= estimate <= 5 * error, (tol, error, estimate)
+        assert estimate <= tol
+
+
+def test_chains_of_discs_agree(rolling):
+    """An independent discretisation, second-order differences extrapolated, agrees within the sum of both estimates."""
+    scene = untwisting_rod(rolling, **UNEVEN, duration=2.0)
+    a, b = (solve(scene, 2e-5, method, frames=3, progress=False) for method in ("spectral", "richardson"))
+    assert b.stats["method"] == "richardson"
+    for name in POSITIONS:
+        places = np.isin(np.round(b.s, 9), np.round(a.s, 9))
+        there = np.isin(np.round(a.s, 9), np.round(b.s, 9))
+        assert there.sum() >= 129
+        gap = np.abs(getattr(a, name)[:, there] - getattr(b, name)[:, places]).max()
+        assert gap <= a.error_estimate[name] + b.error_estimate[name], (name, gap)
+        assert gap < 3e-5
+
+
+def test_rings_to_nine_digits(rolling):
+    scene = breathing_ring(rolling, duration=0.8, radius=0.7)
+    field = solve(scene, 1e-9, frames=4, progress=False)
+    truth = exact.ring(scene.rod, field.t, 0.4, rolling)
+    assert np.abs(np.hypot(field.x, field.y) - truth.radius[:, None]).max() < 1e-9
+    assert np.abs(field.theta - truth.theta[:, None]).max() < 1e-9
+
+
+def test_waved_ring_to_nine_digits(rolling):
+    """A ring that does not stay round, against twice the functions and four times the steps."""
+    ring = breathing_ring(rolling, duration=0.6, radius=0.7)
+
+    def initial(s):
+        x, y, theta, omega = ring.initial(s)
+        return x, y, theta, omega * (1 + 0.8 * np.cos(4 * np.pi * s / ring.rod.length + 0.2))
+
+    scene = Scene(rod=ring.rod, initial=initial, duration=0.6, rolling=rolling, closed=True)
+    field = solve(scene, 1e-9, frames=1, progress=False)
+    rod, z = followed(scene, 77, 200)
+    truth = rod.at(z, field.s)
+    assert np.ptp(np.hypot(truth["x"], truth["y"])) > 5e-3
+    for name in POSITIONS:
+        assert np.abs(getattr(field, name)[-1] - truth[name]).max() < 1e-9
+
+
+def test_high_waves_do_not_grow(rolling):
+    """Rounding stays rounding: without `smooth` waves of number q grow at the rate R omega q, here to 1e-5."""
+    ring = breathing_ring(rolling, duration=0.6, omega=1.0, radius=0.7)
+    _, z = followed(ring, 109, 40)
+    assert np.abs(z.hi[:2, 54:]).max() < 1e-10
+
+
+def test_free_ends_keep_their_slope(rolling):
+    """|r'| = 1 at a free end for all time, to the accuracy of the solution: a sharp test of the ends."""
+    scene = untwisting_rod(rolling, **UNEVEN)
+    rod, z = followed(scene, 55, 64)
+    slopes = rod.slopes(z)
+    assert np.abs(slopes[[0, -1]] - 1).max() < 1e-5
+    assert np.abs(slopes - 1).max() > 1e-2
+
+
+def test_collapsing_ring_is_refused():
+    with pytest.raises(SimulationError, match=r"lost its heading: r' = 0"):
+        solve(breathing_ring("unit", duration=30.0, radius=0.7), 1e-4, progress=False)
