@@ -19,7 +19,7 @@ from compare.lump import lump
 from compare.peers import reduced
 from compare.peers.reduced import Cutoff, Outcome, Peer
 from continuum import Scene
-from discs import Chain, Gauss6, Gauss8, Integrator, Midpoint, Problem, SimulationError, Suzuki4, checks, simulate
+from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, SimulationError, Suzuki4, checks, simulate
 
 SIZES = (32, 128, 512, 2048)
 WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
@@ -155,12 +155,13 @@ def ours(problem: Problem) -> list[Peer]:
     def to_tolerance(setting: float, seconds: float) -> Outcome:
         return _outcome(problem, lambda: simulate(problem, "auto", tol=setting, frames=1, progress=False))
 
-    many = [round(12 * 2 ** (j / 2)) for j in range(15)]
+    many = [round(6 * 2 ** (j / 2)) for j in range(17)]
     return [
-        fixed("midpoint", many, lambda m: Midpoint(tolerance=0.03 / m**2)),
-        fixed("suzuki4", many[:11], lambda m: Suzuki4(Midpoint(tolerance=max(0.01 / m**3, 1e-13)))),
-        fixed("gauss6", many[:13], lambda m: Gauss6(tolerance=max(1e-4 / m**3, 1e-13))),
-        fixed("gauss8", many[:11], lambda m: Gauss8(tolerance=max(1e-5 / m**3, 1e-13))),
+        fixed("midpoint", many[2:], lambda m: Midpoint(tolerance=0.03 / m**2)),
+        fixed("suzuki4", many[2:13], lambda m: Suzuki4(Midpoint(tolerance=max(0.01 / m**3, 1e-13)))),
+        fixed("gauss4", many[:11], lambda m: Gauss4(tolerance=max(1e-3 / m**3, 1e-13))),
+        fixed("gauss6", many[:15], lambda m: Gauss6(tolerance=max(1e-4 / m**3, 1e-13))),
+        fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(1e-5 / m**3, 1e-13))),
         Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all its attempts are counted; the setting is tol"),
     ]
 

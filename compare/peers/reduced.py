@@ -43,7 +43,7 @@ class Peer(NamedTuple):
     tells: str = ""
 
 
-TOLERANCES = tuple(10.0**-k for k in range(3, 12))
+TOLERANCES = tuple(10.0**-k for k in range(2, 12))
 
 
 def bound(problem: Problem) -> Callable[[float, NDArray, NDArray], None]:
@@ -346,7 +346,7 @@ def diffrax_peers(problem: Problem) -> list[Peer]:
         return Peer(f"diffrax {name}", settings, run, "right-hand side written in JAX and compiled by XLA")
 
     most = 2_000_000 // max(1, n // 32)
-    return [peer("Tsit5", diffrax.Tsit5(), TOLERANCES[:7], most), peer("Dopri8", diffrax.Dopri8(), TOLERANCES[:8], most)]
+    return [peer("Tsit5", diffrax.Tsit5(), TOLERANCES[:8], most), peer("Dopri8", diffrax.Dopri8(), TOLERANCES[:9], most)]
 
 
 def _in_jax(problem: Problem) -> Callable[[Any], Any]:
