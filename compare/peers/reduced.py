@@ -212,7 +212,7 @@ def multiplier_peer(problem: Problem) -> Peer:
             raise ArithmeticError(str(found.message))
         return Outcome(found.y[-1].reshape(n, width).T[:rows], 0, calls[0], int(found.njev or 0), spent)
 
-    return Peer("IDA, multipliers", TOLERANCES[:6], run, "index 2; errors of the multipliers are not controlled")
+    return Peer("IDA, multipliers", TOLERANCES[:7], run, "index 2; errors of the multipliers are not controlled")
 
 
 def _gradient(problem: Problem) -> tuple[Callable[[NDArray], NDArray], Callable[[NDArray, NDArray, NDArray], None]]:
@@ -293,7 +293,7 @@ def saddle_peer(problem: Problem) -> Peer:
             raise ArithmeticError(found.message)
         return Outcome(found.y[:size, -1].reshape(rows, n), found.nfev // 12, calls[0], calls[0], spent)
 
-    return Peer("saddle point, DOP853", TOLERANCES[:4], run, "NumPy, dense; index-1 form, so the constraint drifts")
+    return Peer("saddle point, DOP853", TOLERANCES[:5], run, "NumPy, dense; index-1 form, so the constraint drifts")
 
 
 def diffrax_peers(problem: Problem) -> list[Peer]:
