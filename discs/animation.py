@@ -1,12 +1,13 @@
 """Movies of the discs: standing on the plane, with spokes that show the roll, the rod through their centres, and their tracks.
 
 Seen from far away, in the direction c = (cos e cos a, cos e sin a, sin e) with azimuth a and elevation e, a point p is drawn at
-(p . u, p . v), u = (-sin a, cos a, 0), v = c x u; what has the larger p . c is nearer and drawn later. All lines and discs of a frame
-are one collection, sorted so, over a ground that is drawn once: a frame takes some hundredths of a second.
+(p . u, p . v), u = (-sin a, cos a, 0), v = c x u; what has the larger p . c is nearer and drawn later. What moves above the ground
+is one collection, sorted so; the ground is drawn once: a frame takes some hundredths of a second.
 """
 
 import os
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -79,11 +80,10 @@ def animate(
 def _write_mp4(path: Path, pictures: Iterator[NDArray], fps: float, size: tuple[int, int]) -> None:
     import imageio_ffmpeg  # looks for its program when imported
 
-    writer = imageio_ffmpeg.write_frames(str(path), size, pix_fmt_in="rgba", fps=fps, quality=8, macro_block_size=2)
-    writer.send(None)
-    for picture in pictures:
-        writer.send(picture)
-    writer.close()
+    with closing(imageio_ffmpeg.write_frames(str(path), size, "rgba", fps=fps, quality=8, macro_block_size=2)) as writer:
+        writer.send(None)
+        for picture in pictures:
+            writer.send(picture)
 
 
 def _write_gif(path: Path, pictures: Iterator[NDArray], fps: float, size: tuple[int, int]) -> None:

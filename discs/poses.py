@@ -2,7 +2,7 @@
 
 Disc i touches the plane at r_i = (x_i, y_i) and stands upright. Its axle points along the heading d_1, which is (cos phi, sin phi)
 of discs with a heading of their own and r'/|r'| of the others; it rolls along J d_1 (the paper's (constraintsphi):
-r. = R omega J d_1). The spoke that points up at theta = 0 points along d_3 = cos(theta) e_z + sin(theta) J d_1, the paper's director.
+r. = R omega J d_1). The spoke that points up at theta = 0 is the paper's director d_3 = cos(theta) e_z + sin(theta) J d_1.
 """
 
 import numpy as np
