@@ -140,12 +140,12 @@ class Stage:
         ax.set_xlim(middle[0] - half[0], middle[0] + half[0])
         ax.set_ylim(middle[1] - half[1], middle[1] + half[1])
         ax.add_collection(self._ground(low, high, scale), autolim=False)
-        style = {"fontsize": 20 * scale, "color": INK, "transform": ax.transAxes}
-        ax.text(0.98, 0.03, f"radius drawn {self.radius:.3g}", ha="right", **style | {"fontsize": 12 * scale, "color": GREY})
+        note = f"radius drawn {self.radius:.3g}"
+        ax.text(0.98, 0.03, note, ha="right", fontsize=12 * scale, color=GREY, transform=ax.transAxes)
         self._tracked = LineCollection([], colors=GREY, linewidths=0.8 * scale, alpha=0.6, animated=True)
         self._shadows = LineCollection([], colors=INK, linewidths=2.5 * scale, alpha=0.25, animated=True)
         self._things = PolyCollection([], animated=True, joinstyle="round", capstyle="round")
-        self._time = ax.text(0.03, 0.92, "", animated=True, **style)
+        self._time = ax.text(0.03, 0.92, "", fontsize=20 * scale, color=INK, transform=ax.transAxes, animated=True)
         self._scale, self._ax = scale, ax
         self._parts = (self._tracked, self._shadows, self._things, self._time)
         for part in self._parts[:3]:
@@ -160,7 +160,7 @@ class Stage:
         low, high = np.floor(low / step) * step, np.ceil(high / step) * step
         xs, ys = (np.arange(a, b + step / 2, step) for a, b in zip(low, high, strict=True))
         lines = [[(x, ys[0], 0), (x, ys[-1], 0)] for x in xs] + [[(xs[0], y, 0), (xs[-1], y, 0)] for y in ys]
-        return LineCollection(self._flat(np.array(lines)), colors=GROUND, linewidths=1.2 * scale)
+        return LineCollection(list(self._flat(np.array(lines))), colors=GROUND, linewidths=1.2 * scale)
 
     def picture(self, f: int) -> NDArray:
         """Frame f of the run, (height, width, 4) bytes, red, green, blue and opacity."""
@@ -195,8 +195,10 @@ class Stage:
         flat = [outline for points, _ in parts for outline in self._flat(points)]
         kind = np.repeat(np.arange(len(parts)), [len(points) for points, _ in parts])[order]
         self._things.set_verts([flat[i] for i in order], closed=False)
-        self._things.set_facecolor(to_rgba_array([(PALE, 0.75), "none", "none", "none"])[kind])
-        self._things.set_edgecolor(to_rgba_array([BLUE, INK, ORANGE, BLUE])[kind])
-        self._things.set_linewidth(self._scale * np.array([1.4, 0.8, 3.0, 3.5])[kind])
+        self._things.set(
+            facecolor=to_rgba_array([(PALE, 0.75), "none", "none", "none"])[kind],
+            edgecolor=to_rgba_array([BLUE, INK, ORANGE, BLUE])[kind],
+            linewidth=self._scale * np.array([1.4, 0.8, 3.0, 3.5])[kind],
+        )
         ground = at * [1, 1, 0]
         self._shadows.set_segments(list(self._flat(np.stack([ground - radius * forward, ground + radius * forward], axis=1))))

@@ -267,6 +267,7 @@
     event.preventDefault();
     keys[event.key]();
   }, true);
+  globalThis.discs = { panels, camera, go, play }; // for the console
   resize();
   home();
   legend();
