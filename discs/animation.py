@@ -47,7 +47,7 @@ def animate(
     progress : show a progress bar on anything that takes over a second.
     radius : to draw the discs with, length. None draws a eighteenth of the rod, and the movie says so: the spokes turn by the true
         theta, so a disc drawn smaller than it is seems to slide.
-    discs : at most so many are drawn, with their tracks; the rod is drawn whole.
+    discs : about so many are drawn, with their tracks, all of fewer than twice as many; the rod is drawn whole.
     azimuth, elevation : where it is seen from, degrees.
     size : width and height in pixels, even; 1280 x 720, of a .gif 800 x 450.
 

@@ -56,7 +56,7 @@ def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int 
     Parameters
     ----------
     instants : number of times.
-    discs : at most so many are drawn.
+    discs : about so many are drawn, all of fewer than twice as many.
     radius : half the length of a bar; None draws a eighteenth of the rod.
     """
     ax = given_or_new(ax, 6.4, 4.8)

@@ -43,11 +43,11 @@ def turn(vectors: NDArray) -> NDArray:
     return np.stack([-vectors[..., 1, :], vectors[..., 0, :]], axis=-2)
 
 
-def picked(s: NDArray, most: int) -> NDArray:
-    """Indices of the discs to draw: all, or of more than `most` those nearest to `most` equally spaced places."""
-    if s.size <= most:
+def picked(s: NDArray, about: int) -> NDArray:
+    """Indices of about so many discs to draw: those nearest to equally spaced places, or all of fewer than twice as many."""
+    if s.size < 2 * about:
         return np.arange(s.size)
-    places = np.linspace(s[0], s[-1], most)
+    places = np.linspace(s[0], s[-1], about)
     return np.unique(np.abs(s[:, None] - places).argmin(axis=0))
 
 

@@ -4,9 +4,9 @@
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
 INK, PALE, GROUND = "#222222", "#dcebf5", "#e4e4e0"
 
-# scales of colour: what has a sign, white at zero; what has none, matplotlib's viridis at quarters
+# scales of colour: what has a sign, nearly white at zero; what has none, darker where larger
 SIGNED = (BLUE, "#f7f7f7", ORANGE)
-UNSIGNED = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")
+UNSIGNED = ("#f2f7f5", "#8accb5", "#00704f")
 
 LABEL = {
     "t": "time t",

@@ -68,7 +68,7 @@ def view(
     titles : one for each run; None takes the method and the number of discs.
     radius : to draw the discs with, length. None draws a eighteenth of the rod, which the page says: spokes turn by the true theta,
         so a disc drawn smaller than it is seems to slide.
-    discs : at most so many of a run are drawn, and the rod through them.
+    discs : about so many of a run are drawn, all of fewer than twice as many, and the rod through them.
 
     The ground's force can be chosen if both runs recorded it, want=("contact_force",).
 
@@ -85,9 +85,9 @@ def view(
     if len(titles) != len(runs):
         raise ValueError(f"titles must be one for each of the {len(runs)} runs; got {len(titles)}")
     size = poses.drawn_radius(run, radius)
-    most = checks.whole("discs", discs, 2)
+    about = checks.whole("discs", discs, 2)
     data = {
-        "runs": [_data(r, title, most) for r, title in zip(runs, titles, strict=True)],
+        "runs": [_data(r, title, about) for r, title in zip(runs, titles, strict=True)],
         "radius": size,
         "style": {"ink": INK, "grey": GREY, "ground": GROUND, "runs": [BLUE, ORANGE], "signed": SIGNED, "unsigned": UNSIGNED},
         "label": LABEL,
@@ -112,9 +112,9 @@ def _data_file(name: str) -> str:
     return files("discs").joinpath("data", name).read_text(encoding="utf-8")
 
 
-def _data(run: Solution, title: str, most: int) -> dict[str, Any]:
+def _data(run: Solution, title: str, about: int) -> dict[str, Any]:
     """What the page needs of a run; arrays (F, n) of the n discs drawn, the axles as unwrapped angles."""
-    shown = poses.picked(run.s, most)
+    shown = poses.picked(run.s, about)
     axle, slope = poses.axles(run), poses.slopes(run)
     arrays = {
         "x": run.x,

@@ -172,7 +172,7 @@
       pen.beginPath();
       run.t.forEach((time, f) => pen.lineTo(across(time), up(run.energy[f])));
       pen.stroke();
-      const text = `${j ? "- -" : "—"} energy ${run.energy[0].toPrecision(5)}, constant to ${run.drift.toExponential(0)}${runs.length > 1 ? ` (${run.title})` : ""}`;
+      const text = `${j ? "- -" : "—"} energy ${run.energy[0].toPrecision(5)}, varies by ${run.drift.toExponential(0)}${runs.length > 1 ? ` (${run.title})` : ""}`;
       pen.fillText(text, left, 14);
       left += pen.measureText(text).width + 28;
     });

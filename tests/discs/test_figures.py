@@ -58,7 +58,7 @@ def test_picked_discs_are_spread_over_the_rod():
     assert picked[0] == 0
     assert picked[-1] == 199
     np.testing.assert_allclose(s[picked], np.linspace(s[0], s[-1], 11), atol=np.diff(s).max())
-    np.testing.assert_array_equal(poses.picked(s, 200), np.arange(200))
+    np.testing.assert_array_equal(poses.picked(s, 101), np.arange(200))
 
 
 # ---- figures

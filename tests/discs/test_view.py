@@ -14,7 +14,8 @@ from discs.view import View, view
 from tests.conftest import Model, uneven
 
 FLAGS = """--headless=new --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --window-size=700,600
-    --disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync --disable-dev-shm-usage"""
+    --disable-quic --no-first-run --disable-background-networking --disable-component-update
+    --disable-sync --disable-dev-shm-usage"""
 TIMES = [0.0, 0.1, 0.35, 0.6, 1.0]
 
 
