@@ -141,11 +141,11 @@ class Stage:
         ax.set_ylim(middle[1] - half[1], middle[1] + half[1])
         ax.add_collection(self._ground(low, high, scale), autolim=False)
         note = f"radius drawn {self.radius:.3g}"
-        ax.text(0.98, 0.03, note, ha="right", fontsize=12 * scale, color=GREY, transform=ax.transAxes)
+        ax.text(0.98, 0.03, note, ha="right", fontsize=12 * max(scale, 0.7), color=GREY, transform=ax.transAxes)
         self._tracked = LineCollection([], colors=GREY, linewidths=0.8 * scale, alpha=0.6, animated=True)
         self._shadows = LineCollection([], colors=INK, linewidths=2.5 * scale, alpha=0.25, animated=True)
         self._things = PolyCollection([], animated=True, joinstyle="round", capstyle="round")
-        self._time = ax.text(0.03, 0.92, "", fontsize=20 * scale, color=INK, transform=ax.transAxes, animated=True)
+        self._time = ax.text(0.03, 0.92, "", fontsize=20 * max(scale, 0.7), color=INK, transform=ax.transAxes, animated=True)
         self._scale, self._ax = scale, ax
         self._parts = (self._tracked, self._shadows, self._things, self._time)
         for part in self._parts[:3]:

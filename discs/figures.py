@@ -50,7 +50,7 @@ def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Ax
     return axes
 
 
-def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 17, radius: float | None = None) -> Axes:
+def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 15, radius: float | None = None) -> Axes:
     """The centre line from above at several times, with the discs: bars, each with the tip of its spoke d_3 as seen from above.
 
     Parameters

@@ -33,13 +33,6 @@ def shot(page: Path, to: Path, t: float) -> None:
         browser.save_screenshot(str(to))
     finally:
         browser.quit()
-    small(to)
-
-
-def small(path: Path) -> None:
-    """Few colours are enough for drawings."""
-    with Image.open(path) as picture:
-        picture.convert("RGB").quantize(96, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def main() -> None:
@@ -47,9 +40,7 @@ def main() -> None:
     run = simulate(lump(scene, n=32, ends="consistent"), dt=0.02, frames=91)
     run.plot()[0].figure.savefig(IMAGES / "first-look.png", dpi=80)
     run.animate(IMAGES / "rod.gif", fps=20, size=(640, 360))
-    Image.fromarray(Stage(run, size=(960, 540)).picture(-1)).save(IMAGES / "movie.png")
-    for name in ("first-look", "movie"):
-        small(IMAGES / f"{name}.png")
+    Image.fromarray(Stage(run, size=(960, 540)).picture(-1)).convert("RGB").save(IMAGES / "movie.png", optimize=True)
     if not shutil.which("chromedriver"):
         sys.exit("no chromedriver: view.png is not made")
     few = simulate(lump(scene, n=17), dt=0.02, frames=91)
