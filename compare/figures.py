@@ -12,20 +12,17 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import NDArray
 
 from continuum import Scene
-from discs import Solution
+from discs import Solution, poses
+from discs import figures as of_discs
+from discs.figures import given_or_new
+from discs.style import BLUE, GREEN, GREY, ORANGE, PURPLE
 
 if TYPE_CHECKING:
     from compare.precision import WorkPrecision
     from compare.study import Study
 
-# Okabe and Ito's colours, distinct for colour-blind readers
-BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
 LABEL = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
-
-
-def _axes(ax: Axes | None, width: float, height: float) -> Axes:
-    return Figure(figsize=(width, height), layout="constrained").subplots() if ax is None else ax
 
 
 def save(ax: Axes, path: str | Path) -> None:
@@ -35,7 +32,7 @@ def save(ax: Axes, path: str | Path) -> None:
 
 def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
     """Error against number of discs, log-log, with slopes 1 and 2 and the field's own error estimate."""
-    ax = _axes(ax, 6.8, 5.6)
+    ax = given_or_new(ax, 6.8, 5.6)
     ax.set_xscale("log")
     if any((s.error > 0).any() for s in studies):
         ax.set_yscale("log")  # a motion without error, as of a rod at rest, has no logarithm
@@ -72,7 +69,7 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
 def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
     """The paper's figure of the motion: at each frame the centre line and the director d_3 = cos(theta) e_z + sin(theta) J d_1.
 
-    The last panel shows all centre lines from above.
+    The last panel shows all of them from above.
     """
     columns = 3
     rows = -(-(len(run.t) + 1) // columns)
@@ -82,29 +79,17 @@ def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
         lines = [np.append(line, line[:, :1] + np.array(scene.shift)[:, None], axis=1) for line in lines]
     everything = np.concatenate(lines, axis=1)
     middle, reach = everything.mean(axis=1), np.ptp(everything, axis=1).max() / 2 * 1.1
-    shown = np.unique(np.linspace(0, run.s.size - 1, arrows).round().astype(int))
+    shown, sideways = poses.picked(run.s, arrows), poses.turn(poses.axles(run))
     for f, (x, y) in enumerate(lines):
         ax: Axes3D = figure.add_subplot(rows, columns, f + 1, projection="3d")
-        tangent = np.gradient(np.stack([x, y]), axis=1)[:, : run.s.size]
-        tangent /= np.hypot(*tangent)
-        if run.phi is not None:  # a section's own heading
-            tangent = np.array([np.cos(run.phi[f]), np.sin(run.phi[f])])
         sine, cosine = np.sin(run.theta[f]), np.cos(run.theta[f])
-        d3 = np.array([-tangent[1] * sine, tangent[0] * sine, cosine])[:, shown]
+        d3 = np.array([*(sideways[f] * sine), cosine])[:, shown]
         ax.plot(x, y, 0, color=BLUE, linewidth=2)
         ax.quiver(x[shown], y[shown], 0, *(0.25 * reach * d3), color=ORANGE, linewidth=1, arrow_length_ratio=0.25)
         _stage(ax, middle, reach)
         ax.set_title(f"t = {run.t[f]:.3g}", y=0.98)
     top: Any = figure.add_subplot(rows, columns, len(lines) + 1)
-    for f, (x, y) in enumerate(lines):
-        shade = 0.25 + 0.75 * f / max(len(lines) - 1, 1)
-        top.plot(x, y, color=BLUE, alpha=shade, label=f"t = {run.t[f]:.3g}")
-    top.set_aspect("equal")
-    top.set_xlabel("x")
-    top.set_ylabel("y")
-    top.set_title("centre lines from above")
-    top.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.02, 0.5))
-    top.grid(alpha=0.3)
+    of_discs.motion(run, top, instants=len(lines))
     figure.suptitle(f"{scene.name}, {scene.rolling} law; arrows are the directors d₃")
     return figure
 
@@ -123,7 +108,7 @@ def _stage(ax: Axes3D, middle: NDArray, reach: float) -> None:
 
 def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
     """Energy against time, all runs in the same axes; dotted, the modified energy of a run that has one."""
-    ax = _axes(ax, 7.6, 4.6)
+    ax = given_or_new(ax, 7.6, 4.6)
     for (label, run), colour in zip(runs.items(), (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         ax.plot(run.t, run.energy, color=colour, label=label, linewidth=1)
         if run.modified_energy is not None:

@@ -1,15 +1,148 @@
-"""Pictures of the discs. Every function returns its figure; nothing opens a window."""
+"""Pictures of the discs. Every function draws into the axes it is given, or new ones, and returns them; nothing opens a window."""
+
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from discs import checks, poses
 from discs.chain import SteeredChain
 from discs.problem import Problem, State
+from discs.solution import Solution
+from discs.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED
 from discs.vakonomic import Motion, of_chain, rolling_disc, solve
 
-# Okabe and Ito's colours, distinct for colour-blind readers
-BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
+
+def given_or_new(ax: Axes | None, width: float, height: float) -> Axes:
+    """The axes to draw into: those given, or of a new figure of this size in inches."""
+    return Figure(figsize=(width, height), layout="constrained").subplots() if ax is None else ax
+
+
+def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Axes] | None = None) -> list[Axes]:
+    """What to look at first; the panels asked for, one of `PANELS` each, or all.
+
+    Parameters
+    ----------
+    panels : "motion" (from above), "theta" and "omega" over (s, t), "end" (the first disc against time), "profiles" (theta along
+        the rod), "energy" (its error).
+    ax : one axes for each panel, or None for a new figure.
+
+    Raises
+    ------
+    ValueError : for an unknown panel, another number of axes, or a run of a single frame.
+    """
+    names = [checks.choice("panel", name, PANELS) for name in panels] or list(PANELS)
+    if ax is None:
+        columns = min(len(names), 3)
+        rows = -(-len(names) // columns)
+        figure = Figure(figsize=(4.8 * columns, 3.7 * rows), layout="constrained")
+        axes = [figure.add_subplot(rows, columns, i + 1) for i in range(len(names))]
+    else:
+        axes = [ax] if isinstance(ax, Axes) else list(ax)
+    if len(axes) != len(names):
+        raise ValueError(f"ax must be one axes for each of the {len(names)} panels; got {len(axes)}")
+    if run.t.size < 2:
+        raise ValueError("a picture over time takes at least two frames; got 1")
+    for name, one in zip(names, axes, strict=True):
+        PANELS[name](run, one)
+    return axes
+
+
+def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 15, radius: float | None = None) -> Axes:
+    """The centre line from above at several times, with the discs: bars, each with the tip of its spoke d_3 as seen from above.
+
+    Parameters
+    ----------
+    instants : number of times.
+    discs : about so many are drawn, all of fewer than twice as many.
+    radius : half the length of a bar; None draws a eighteenth of the rod.
+    """
+    ax = given_or_new(ax, 6.4, 4.8)
+    frames = poses.instants(run, checks.whole("instants", instants, 1))
+    shown = poses.picked(run.s, checks.whole("discs", discs, 1))
+    size = poses.drawn_radius(run, radius)
+    forward = poses.turn(poses.axles(run))
+    ring = poses.is_ring(run)
+    for f, shade in zip(frames, np.linspace(0.25, 1, frames.size), strict=True):
+        r = np.stack([run.x[f], run.y[f]])
+        line = np.append(r, r[:, :1], axis=1) if ring else r
+        ax.plot(*line, color=BLUE, alpha=shade, linewidth=2, label=f"t = {run.t[f]:.3g}")
+        at, along = r[:, shown], size * forward[f][:, shown]
+        ax.plot(*np.stack([at - along, at + along], axis=1), color=INK, alpha=shade, linewidth=0.9)
+        tip = at + np.sin(run.theta[f, shown]) * along
+        up = np.cos(run.theta[f, shown]) >= 0
+        ax.plot(*tip[:, up], "o", color=ORANGE, alpha=shade, markersize=3.5)
+        ax.plot(*tip[:, ~up], "o", color=ORANGE, markerfacecolor="white", alpha=shade, markersize=3.5)
+    _from_above(ax, "from above; ● spoke up, ○ down")
+    ax.legend(fontsize=8)
+    return ax
+
+
+def spacetime(run: Solution, name: str = "omega", ax: Axes | None = None) -> Axes:
+    """theta or omega in colour over (s, t), with contour lines, dashed below zero, that print without colour."""
+    ax = given_or_new(ax, 5.4, 4.4)
+    values = getattr(run, checks.choice("name", name, ("theta", "omega")))
+    reach = np.abs(values).max() or 1.0
+    colours = LinearSegmentedColormap.from_list("signed", SIGNED)
+    mesh = ax.pcolormesh(run.s, run.t, values, cmap=colours, vmin=-reach, vmax=reach, shading="gouraud", rasterized=True)
+    if np.ptp(values) > 1e-9 * reach:
+        ax.contour(run.s, run.t, values, levels=9, colors=INK, linewidths=0.5)
+    bar = ax.figure.colorbar(mesh, ax=ax)
+    bar.set_label(LABEL[name])
+    ax.set_xlabel(LABEL["s"])
+    ax.set_ylabel(LABEL["t"])
+    return ax
+
+
+def end_disc(run: Solution, ax: Axes | None = None) -> Axes:
+    """Where the first disc is and how far it has rolled, against time."""
+    ax = given_or_new(ax, 5.4, 4.0)
+    for name, symbol, colour, line in (("x", "x", BLUE, "-"), ("y", "y", ORANGE, "--"), ("theta", "θ", GREEN, "-.")):
+        ax.plot(run.t, getattr(run, name)[:, 0], line, color=colour, label=symbol)
+    ax.set_xlabel(LABEL["t"])
+    ax.set_ylabel("x, y (length), θ (rad)")
+    ax.set_title(f"disc at s = {run.s[0]:g}", fontsize="medium")
+    ax.legend(fontsize=8)
+    ax.grid(alpha=0.3)
+    return ax
+
+
+def profiles(run: Solution, name: str = "theta", ax: Axes | None = None, instants: int = 5) -> Axes:
+    """theta or omega along the rod at several times, later ones darker."""
+    ax = given_or_new(ax, 5.4, 4.0)
+    values = getattr(run, checks.choice("name", name, ("theta", "omega")))
+    frames = poses.instants(run, checks.whole("instants", instants, 1))
+    for f, shade in zip(frames, np.linspace(0.25, 1, frames.size), strict=True):
+        ax.plot(run.s, values[f], color=BLUE, alpha=shade, label=f"t = {run.t[f]:.3g}")
+    ax.set_xlabel(LABEL["s"])
+    ax.set_ylabel(LABEL[name])
+    ax.legend(fontsize=8)
+    ax.grid(alpha=0.3)
+    return ax
+
+
+def energy_error(run: Solution, ax: Axes | None = None) -> Axes:
+    """Change of the energy against time, relative to that of the start if there is one."""
+    ax = given_or_new(ax, 5.4, 4.0)
+    start = float(run.energy[0])
+    ax.plot(run.t, (run.energy - start) / (start or 1.0), color=BLUE)
+    ax.set_xlabel(LABEL["t"])
+    ax.set_ylabel("(E − E₀)/E₀" if start else "E")
+    ax.set_title(f"energy, E₀ = {start:.6g}", fontsize="medium")
+    ax.grid(alpha=0.3)
+    return ax
+
+
+PANELS = {
+    "motion": motion,
+    "theta": lambda run, ax: spacetime(run, "theta", ax),
+    "omega": lambda run, ax: spacetime(run, "omega", ax),
+    "end": end_disc,
+    "profiles": lambda run, ax: profiles(run, "theta", ax),
+    "energy": energy_error,
+}
 
 
 def vakonomic() -> Figure:

@@ -1,10 +1,16 @@
 """What a run returns."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from discs.view import View
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,3 +67,27 @@ class Solution:
             f"Solution({frames} frames of {n} discs, t = {self.t[0]:g} to {self.t[-1]:g}, "
             f"method {self.stats.get('method')!r}, energy {self.energy[0]:.6g} to within {drift:.1e})"
         )
+
+    def plot(self, *panels: str, ax: Any = None) -> "list[Axes]":
+        """A first look at the run: all panels, or those named; see `discs.figures.first_look`."""
+        from discs import figures  # pictures are imported when one is wanted
+
+        return figures.first_look(self, panels, ax)
+
+    def plot_motion(self, ax: "Axes | None" = None, **style: Any) -> "Axes":
+        """The centre line and the discs from above at several times; see `discs.figures.motion`."""
+        from discs import figures
+
+        return figures.motion(self, ax, **style)
+
+    def animate(self, path: str | Path, fps: float = 25, progress: bool = True, **style: Any) -> Path:
+        """A movie, .mp4 or .gif, of the discs as they roll, one picture a frame; see `discs.animation.animate`."""
+        from discs.animation import animate
+
+        return animate(self, path, fps, progress, **style)
+
+    def view(self, path: str | Path | None = None, beside: "Solution | None" = None, **style: Any) -> "View":
+        """A page to turn and play the run in three dimensions, alone or beside another; see `discs.view.view`."""
+        from discs.view import view
+
+        return view(self, path, beside, **style)

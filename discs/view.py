@@ -1,0 +1,141 @@
+"""A page to turn and play runs in three dimensions: one file, no network, for a browser or a notebook.
+
+The page holds three.js, the frames as base64 of 32-bit floats, little-endian, frame after frame, and a script; see `discs/data`.
+Between frames positions and angles are interpolated linearly in time.
+"""
+
+import base64
+import html
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from discs import checks, poses
+from discs.solution import Solution
+from discs.style import BLUE, GREY, GROUND, INK, LABEL, ORANGE, SIGNED, UNSIGNED
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A page, shown by a notebook where it is the last line of a cell.
+
+    Attributes
+    ----------
+    page : the whole page, HTML.
+    path : where it was written, or None.
+    """
+
+    page: str
+    path: Path | None = None
+
+    def save(self, path: str | Path) -> "View":
+        """Write the page to a file, in a folder that exists."""
+        path = Path(path)
+        if not path.parent.is_dir():
+            raise ValueError(f"path must be in a folder that exists; got {str(path)!r}")
+        path.write_text(self.page, encoding="utf-8")
+        return View(self.page, path)
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{html.escape(self.page)}" style="width:100%;height:620px;border:0"></iframe>'
+
+    def __repr__(self) -> str:
+        where = f"in {str(self.path)!r}" if self.path else "shown by a notebook, or written by .save('rod.html')"
+        return f"View({len(self.page) / 1e6:.1f} MB, {where})"
+
+
+def view(
+    run: Solution,
+    path: str | Path | None = None,
+    beside: Solution | None = None,
+    titles: Sequence[str] = (),
+    radius: float | None = None,
+    discs: int = 65,
+) -> View:
+    """Make the page of a run: play, scrub, speed, orbit, colour by theta, omega, |r'| or the ground's force, the energy below.
+
+    Parameters
+    ----------
+    path : where to write it, .html; None writes nothing.
+    beside : another run, shown to the right at the same time and from the same place.
+    titles : one for each run; None takes the method and the number of discs.
+    radius : to draw the discs with, length. None draws a eighteenth of the rod, which the page says: spokes turn by the true theta,
+        so a disc drawn smaller than it is seems to slide.
+    discs : about so many of a run are drawn, all of fewer than twice as many, and the rod through them.
+
+    The ground's force can be chosen if both runs recorded it, want=("contact_force",).
+
+    Raises
+    ------
+    ValueError : for something else beside, another number of titles, a folder that is not there or another kind of file.
+    """
+    if beside is not None and not isinstance(beside, Solution):
+        raise ValueError(f"beside must be another Solution; got {type(beside).__name__}")
+    if path is not None:
+        checks.choice("the page's ending", Path(path).suffix.lower(), (".html",))
+    runs = [run] if beside is None else [run, beside]
+    titles = list(titles) or [_title(r) for r in runs]
+    if len(titles) != len(runs):
+        raise ValueError(f"titles must be one for each of the {len(runs)} runs; got {len(titles)}")
+    size = poses.drawn_radius(run, radius)
+    about = checks.whole("discs", discs, 2)
+    data = {
+        "runs": [_data(r, title, about) for r, title in zip(runs, titles, strict=True)],
+        "radius": size,
+        "style": {"ink": INK, "grey": GREY, "ground": GROUND, "runs": [BLUE, ORANGE], "signed": SIGNED, "unsigned": UNSIGNED},
+        "label": LABEL,
+    }
+    parts = {
+        "TITLE": html.escape(" and ".join(titles)),
+        "DATA": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
+        "SCRIPT": _data_file("view.js"),
+        "THREE": _data_file("three.min.js"),
+    }
+    page = re.sub("@(TITLE|DATA|SCRIPT|THREE)@", lambda mark: parts[mark[1]], _data_file("view.html"))
+    made = View(page)
+    return made if path is None else made.save(path)
+
+
+def _title(run: Solution) -> str:
+    what = "discs" if run.error_estimate is None else "nodes of the field"
+    return ", ".join([f"{run.s.size} {what}", *filter(None, [run.stats.get("method")])])
+
+
+def _data_file(name: str) -> str:
+    return files("discs").joinpath("data", name).read_text(encoding="utf-8")
+
+
+def _data(run: Solution, title: str, about: int) -> dict[str, Any]:
+    """What the page needs of a run; arrays (F, n) of the n discs drawn, the axles as unwrapped angles."""
+    shown = poses.picked(run.s, about)
+    axle, slope = poses.axles(run), poses.slopes(run)
+    arrays = {
+        "x": run.x,
+        "y": run.y,
+        "theta": run.theta,
+        "omega": run.omega,
+        "axle": np.unwrap(np.arctan2(axle[:, 1], axle[:, 0]), axis=0),
+        "stretch": np.hypot(slope[:, 0], slope[:, 1]),
+    }
+    if run.contact_force is not None:
+        arrays["force"] = np.hypot(run.contact_force[:, 0], run.contact_force[:, 1])
+    return {
+        "title": title,
+        "n": int(shown.size),
+        "ring": poses.is_ring(run),
+        "t": run.t.tolist(),
+        "energy": run.energy.tolist(),
+        "drift": float(np.abs(run.energy - run.energy[0]).max()),
+        "arrays": {name: _packed(values[:, shown]) for name, values in arrays.items()},
+    }
+
+
+def _packed(values: ArrayLike) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")

@@ -1,0 +1,54 @@
+"""Make the pictures of docs/pictures.md and the README's: `python docs/pictures.py`, half a minute; the page needs chromium."""
+
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from PIL import Image
+
+from compare import lump
+from continuum import solve, untwisting_rod
+from discs import simulate
+from discs.animation import Stage
+
+IMAGES = Path(__file__).parent / "images"
+
+
+def shot(page: Path, to: Path, t: float) -> None:
+    """A picture of a page at a time, by a browser without a window."""
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    flags = "--headless=new --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --window-size=1200,760"
+    for flag in flags.split():
+        options.add_argument(flag)
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=shutil.which("chromedriver")))
+    try:
+        browser.get(page.as_uri())
+        browser.execute_script("discs.go(arguments[0])", t)
+        time.sleep(2)
+        browser.save_screenshot(str(to))
+    finally:
+        browser.quit()
+
+
+def main() -> None:
+    scene = untwisting_rod()
+    run = simulate(lump(scene, n=32, ends="consistent"), dt=0.02, frames=91)
+    run.plot()[0].figure.savefig(IMAGES / "first-look.png", dpi=80)
+    run.animate(IMAGES / "rod.gif", fps=20, size=(640, 360))
+    Image.fromarray(Stage(run, size=(960, 540)).picture(-1)).convert("RGB").save(IMAGES / "movie.png", optimize=True)
+    if not shutil.which("chromedriver"):
+        sys.exit("no chromedriver: view.png is not made")
+    few = simulate(lump(scene, n=17), dt=0.02, frames=91)
+    field = solve(scene, tol=1e-3, frames=91)
+    with tempfile.TemporaryDirectory() as folder:
+        page = few.view(Path(folder) / "both.html", beside=field, titles=("17 discs, plain springs", "the rod they become"))
+        shot(page.path, IMAGES / "view.png", 4.5)
+
+
+if __name__ == "__main__":
+    main()
