@@ -41,14 +41,21 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def lesson(path: Path) -> tuple[str, dict[str, bytes]]:
     """A notebook as Markdown, executed if it has been, with formulas as MathML, which needs no script; pictures by name."""
-    executed = EXECUTED / path.name
-    notebook = nbformat.read(executed if executed.exists() else path, as_version=4)
+    notebook, executed = nbformat.read(path, as_version=4), EXECUTED / path.name
+    if executed.exists() and sources(found := nbformat.read(executed, as_version=4)) == sources(notebook):
+        notebook = found
     for cell in notebook.cells:
-        if cell.cell_type == "markdown":
+        if cell.cell_type == "code":
+            cell.outputs = [out for out in cell.outputs if out.get("name") != "stderr"]  # progress bars
+        else:
             cell.source = re.sub(r"\$\$(.+?)\$\$", lambda m: convert(m[1], display="block"), cell.source, flags=re.DOTALL)
             cell.source = re.sub(r"\$(.+?)\$", lambda m: convert(m[1]), cell.source)
     body, resources = MarkdownExporter().from_notebook_node(notebook, {"output_files_dir": path.stem})
     return f"{body}\n\n[This page as a notebook]({path.name})\n", resources["outputs"]
+
+
+def sources(notebook: nbformat.NotebookNode) -> list[str]:
+    return [cell.source for cell in notebook.cells]
 
 
 def modules(package: str) -> list[str]:
