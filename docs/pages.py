@@ -49,7 +49,9 @@ def lesson(path: Path) -> tuple[str, dict[str, bytes]]:
             cell.outputs = [out for out in cell.outputs if out.get("name") != "stderr"]  # progress bars
         else:
             cell.source = re.sub(r"\$\$(.+?)\$\$", lambda m: convert(m[1], display="block"), cell.source, flags=re.DOTALL)
-            cell.source = re.sub(r"\$(.+?)\$", lambda m: convert(m[1]), cell.source)
+            cell.source = re.sub(r"\]\(([\w-]+)\.ipynb\)", r"](\1.md)", cell.source)
+            # in a span: Markdown would take a line that begins with <math> for a block
+            cell.source = re.sub(r"\$(.+?)\$", lambda m: f"<span>{convert(m[1])}</span>", cell.source)
     body, resources = MarkdownExporter().from_notebook_node(notebook, {"output_files_dir": path.stem})
     return f"{body}\n\n[This page as a notebook]({path.name})\n", resources["outputs"]
 
