@@ -6,7 +6,7 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check --editable
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: run test clean
+.PHONY: run test docs clean
 
 run: .venv/run
 	$(BIN)/python -m compare --out out
@@ -17,6 +17,11 @@ test: .venv/test
 	$(BIN)/mypy
 	$(BIN)/python -m discs.kernels
 	$(BIN)/pytest
+
+# the lessons with their pictures, and the site; open site/index.html
+docs: .venv/docs
+	$(BIN)/jupyter nbconvert --log-level WARN --execute --to notebook --output-dir out/notebooks notebooks/*.ipynb
+	$(BIN)/mkdocs build --strict
 
 .venv/made:
 	$(PYTHON) -m venv .venv
@@ -31,5 +36,9 @@ test: .venv/test
 	$(PIP) ".[test,peers]" || $(PIP) ".[test]"
 	touch $@
 
+.venv/docs: .venv/made pyproject.toml
+	$(PIP) ".[docs]"
+	touch $@
+
 clean:
-	rm -rf .venv out
+	rm -rf .venv out site

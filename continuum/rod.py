@@ -65,11 +65,12 @@ class Rod:
 class SteeredRod(Rod):
     """A rod whose sections have headings phi of their own: the planar Simo-Reissner rod, rolling; see `continuum.elements`.
 
+    Bending is K phi'**2/2. Parameters that are not below are those of `Rod`.
+
     Parameters
     ----------
     heading_inertia : J, moment of inertia about the vertical per length, > 0.
     stretch_stiffness, shear_stiffness : A, G >= 0, force per stretch and per shear angle.
-    The others are those of `Rod`; bending is K phi'**2/2.
     """
 
     shear_stiffness: float

@@ -74,8 +74,10 @@ class ConstrainedSystem:
     def accelerations(self, q: NDArray, v: NDArray, mu: NDArray | None = None) -> tuple[NDArray, NDArray]:
         """q.., (n,), and lambda, (m,); nonholonomic without mu, vakonomic with mu (m,), where mu. = -lambda.
 
-        From the saddle point  [M  -A^T] [q..   ]   [-grad V + G mu]
-                               [A   0  ] [lambda] = [-A. q.        ].
+        From the saddle point
+
+            [M  -A^T] [q..   ]   [-grad V + G mu]
+            [A   0  ] [lambda] = [-A. q.        ].
         """
         a, d = self.constraint(q), self.derivative(q)
         m, n = a.shape

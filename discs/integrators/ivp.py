@@ -74,7 +74,7 @@ class SolveIvp(Integrator, ABC):
     Parameters
     ----------
     rtol, atol : tolerances of a step's error, relative to |y| and absolute; pi of a disc is small like the root of its share
-    of length.
+        of length.
     """
 
     rtol: float = 1e-6

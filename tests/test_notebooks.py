@@ -1,0 +1,53 @@
+"""The lessons: kept without outputs, alike in form, and each runs and asserts its numbers."""
+
+import re
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
+each = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+
+
+def test_lessons_are_numbered():
+    assert [path.name[:3] for path in NOTEBOOKS] == [f"{number:02d}-" for number in range(1, len(NOTEBOOKS) + 1)]
+
+
+@each
+def test_outputs_are_stripped(path):
+    for number, cell in enumerate(nbformat.read(path, as_version=4).cells):
+        if cell.cell_type == "code":
+            assert not cell.outputs, f"cell {number}: clear all outputs before committing"
+            assert cell.execution_count is None
+
+
+@each
+def test_has_the_form_of_a_lesson(path):
+    notebook = nbformat.read(path, as_version=4)
+    text = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    code = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
+    assert text.startswith(f"# {int(path.name[:2])}. ")
+    assert re.match(r"# [^\n]+\n\n\*\*[^\n]+\?\*\*\n", text)  # one question
+    order = ["$$", "**What it means.**", "## Exercises", "## Answers"]
+    assert sorted(order, key=text.index) == order
+    for number in re.findall(r"^(\d)\. ", text.split("## Exercises")[1].split("## Answers")[0], re.MULTILINE):
+        assert f"\n**{number}.**" in text.split("## Answers")[1]
+    assert "plt." in code
+    assert "assert " in code
+    for target in re.findall(r"\]\(([^)#]+)\)", text):
+        assert target.startswith("https://") or (path.parent / target).exists()
+
+
+@each
+def test_runs(path):
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(path.parent)}}).execute()
+    told = [
+        out.text
+        for cell in notebook.cells
+        for out in cell.get("outputs", ())
+        if out.output_type == "stream" and out.name == "stderr"
+    ]
+    assert "Warning" not in "".join(told)

@@ -1,0 +1,97 @@
+"""The documentation site builds without a warning and needs no other server."""
+
+import importlib
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the site, built as `make docs` does, but for the lessons' pictures."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    built = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+def test_nothing_is_fetched_from_other_servers(site):
+    pages = list(site.rglob("*.html"))
+    assert pages
+    for page in pages:
+        for tag in re.findall(r"<(?:script|link|img|iframe)\b[^>]*>", page.read_text(encoding="utf-8")):
+            assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", tag) or "canonical" in tag, f"{page.name}: {tag}"
+
+
+def test_reference_has_everything_that_is_exported(site):
+    for package in ("discs", "continuum", "compare"):
+        index = (site / "reference" / f"{package}.html").read_text(encoding="utf-8")
+        module = importlib.import_module(package)
+        for name in module.__all__:
+            thing = getattr(module, name)
+            target = f"{thing.__module__}.html#{thing.__module__}.{thing.__name__}"
+            assert f'href="{target}"' in index
+            page, anchor = target.split("#")
+            assert f'id="{anchor}"' in (site / "reference" / page).read_text(encoding="utf-8")
+
+
+def test_reference_tells_parameters_shapes_and_errors(site):
+    page = (site / "reference" / "discs.simulation.html").read_text(encoding="utf-8")
+    text = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", page))
+    assert "Parameters:" in text
+    assert "show a progress bar on anything that takes over a second" in text
+    assert "for an unknown method or quantity" in text
+    page = (site / "reference" / "discs.solution.html").read_text(encoding="utf-8")
+    assert "(F, N), contact points, length." in re.sub(r"<[^>]+>", "", page)
+
+
+def test_lessons_are_pages_with_formulas_and_notebooks_to_take_away(site):
+    for path in (ROOT / "notebooks").glob("*.ipynb"):
+        page = (site / "lessons" / f"{path.stem}.html").read_text(encoding="utf-8")
+        assert "<math" in page
+        assert "$$" not in page
+        assert (site / "lessons" / path.name).read_bytes() == path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def docstrings():
+    """docs/docstrings.py, which is no package's module."""
+    spec = importlib.util.spec_from_file_location("docstrings", ROOT / "docs" / "docstrings.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_house_docstrings_in_the_form_that_griffe_takes(docstrings):
+    house = """Run it.
+
+Parameters
+----------
+n, m : numbers of discs,
+    at least 3.
+
+Any units.
+
+Returns
+-------
+(n,) : energies.
+"""
+    assert docstrings.translate(house).splitlines() == [
+        *("Run it.", "", "Any units.", ""),
+        *("Parameters", "----------", "n, m", "    numbers of discs,", "    at least 3.", ""),
+        *("Returns", "-------", ":", "    (n,) : energies."),
+    ]
+
+
+def test_powers_are_not_emphasis_and_code_is_left_alone(docstrings):
+    text = "K r**2 and **Rolling.** and `a**b`\n\n    r**2 + q**2\n"
+    assert docstrings.literal(text) == "K r\\*\\*2 and **Rolling.** and `a**b`\n\n    r**2 + q**2\n"
