@@ -191,7 +191,7 @@ class Course:
 
     Parameters
     ----------
-    times, s : (F,), (S,), where fields are compared and given.
+    times : (F,), when fields are compared and given.
     tolerance : of the sweeps of a step.
     """
 
