@@ -4,5 +4,6 @@ from compare.lump import lump
 from compare.main_job import overview
 from compare.precision import WorkPrecision, work_precision
 from compare.study import Study, convergence
+from compare.sweeps import sweep
 
-__all__ = ["Study", "WorkPrecision", "convergence", "lump", "overview", "work_precision"]
+__all__ = ["Study", "WorkPrecision", "convergence", "lump", "overview", "sweep", "work_precision"]
