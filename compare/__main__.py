@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from compare import precision
+from compare import precision, report
 from compare.background import background
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
@@ -44,7 +44,20 @@ def parser() -> argparse.ArgumentParser:
         commands.add_parser("precision", help="speed against error beside other integrators", description=precision.__doc__)
     )
     add_stability(commands.add_parser("stability", help="hard cases by every method", description=stability.__doc__))
+    add_report(commands.add_parser("report", help="everything on one page", description=report.__doc__))
     return p
+
+
+def add_report(p: argparse.ArgumentParser) -> None:
+    """The options of `report`."""
+    p.add_argument(
+        "--out", metavar="DIR", default="out", help="folder for report.html, report.md, pictures and data (default: out)"
+    )
+    p.add_argument(
+        "--n", metavar="N", type=int, nargs="+", default=list(report.SIZES), help="numbers of discs (default: 17 ... 257)"
+    )
+    p.add_argument("--tol", metavar="TOL", type=float, default=1e-4, help="largest error of the fields (default: 1e-4)")
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
 def add_precision(p: argparse.ArgumentParser) -> None:
@@ -117,6 +130,10 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if options.command == "precision":
             run_precision(options)
+            return 0
+        if options.command == "report":
+            report.report(options.out, options.n, options.tol, progress=not options.quiet)
+            print(f"written to {options.out}: report.html, report.md, pictures and their data")
             return 0
         if options.command == "stability":
             run_stability(options)

@@ -201,10 +201,10 @@ def stability(study: "Stability", growth: "Growth | None") -> list[Axes]:
     if growth is not None:
         right.plot(growth.q, growth.relation, "-", color=GREY, label="dispersion relation, 33 discs")
         right.plot(growth.q, growth.measured, "o", color=BLUE, markersize=4, label="measured, midpoint")
+        right.legend(fontsize=8)
     right.set_xlabel("wave number q")
     right.set_ylabel("growth rate σ")
     right.set_ylim(bottom=0)
     right.set_title("straight rod rolling under the field law", fontsize="medium")
-        right.legend(fontsize=8)
     right.grid(alpha=0.3)
     return [left, right]

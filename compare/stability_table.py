@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from compare import figures
 from compare.background import background
-from compare.hard_cases import OURS, PEERS, RTOL, TOL, Case, Found, cases, rolling_waves
+from compare.hard_cases import OURS, PEERS, RTOL, TOL, Case, Found, Growth, cases, rolling_waves
 from compare.sweeps import Result, read, sweep
 from discs import checks
 
@@ -83,7 +83,7 @@ class Stability:
         return "\n".join(lines)
 
     def summary(self) -> str:
-        """What ours did not do as expected, in lines of Markdown, and what the grid's words mean."""
+        """What ours did not do as expected, in lines of Markdown."""
         told = [r for r in self.rows if r.expected]
         lines = [f"{len(told)} runs of ours, {len(self.failures)} not as expected{':' if self.failures else '.'}"]
         for row in self.failures:
@@ -92,16 +92,20 @@ class Stability:
             lines.append(f"* {row.case}, {row.setting}, `{row.method}`: {how} {f.note} {f.says[:120]}".rstrip())
         return "\n".join(lines)
 
-    def report(self) -> str:
-        """Everything, in Markdown."""
-        wants = dict.fromkeys(f"* **{c.name}**: {c.what}. {c.expectation.kind}: {c.expectation.words}." for c in self.cases)
-        words = (
+    @property
+    def words(self) -> str:
+        """What the words of the grid mean."""
+        return (
             "holds: to the end, energy (the number, relative) and where known positions within the bound. says so: off, with steps "
             "counted as unconverged or a warning. **LOST**: off, without a word. stops, refused: an error with time and disc, or "
             "before the start. fails: a peer's error. cut off: too slow. Bold: not as expected of ours. "
             f"auto runs to {TOL:g}, peers to rtol {RTOL:g}, their energy is that at the end; they keep rolling by their variables."
         )
-        parts = ["# Hard cases", self.summary(), words, self.grid(), "## What is expected", "\n".join(wants), "## All runs"]
+
+    def report(self) -> str:
+        """Everything, in Markdown."""
+        wants = dict.fromkeys(f"* **{c.name}**: {c.what}. {c.expectation.kind}: {c.expectation.words}." for c in self.cases)
+        parts = ["# Hard cases", self.summary(), self.words, self.grid(), "## What is expected", "\n".join(wants), "## All runs"]
         return "\n\n".join([*parts, self.table()])
 
     def save(self, path: str | Path) -> None:
@@ -111,9 +115,14 @@ class Stability:
             writer.writerow([*Row._fields[:-1], *Found._fields])
             writer.writerows([*row[:-1], *row.found] for row in self.rows)
 
+    @cached_property
+    def waves(self) -> Growth | None:
+        """Growth on the straight rod rolling under the field law, by midpoint, for the figure."""
+        return rolling_waves(33, "field", 0.7, 4.0, "midpoint", np.inf)[1]
+
     def plot(self, path: str | Path | None = None) -> Any:
         """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
-        axes = figures.stability(self, rolling_waves(33, "field", 0.7, 4.0, "midpoint", np.inf)[1])
+        axes = figures.stability(self, self.waves)
         if path is not None:
             figures.save(axes[0], path)
         return axes
