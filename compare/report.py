@@ -1,4 +1,4 @@
-"""Everything on one page: the scene, its motion, N -> infinity, two laws of rolling, energy, speed, stability, and what it ran on."""
+"""Everything on one page: the scene, its motion, N -> infinity, two laws of rolling, energy, speed, stability, versions."""
 
 import base64
 import csv
@@ -74,7 +74,8 @@ class Page:
         self.parts += paragraphs
 
     def figure(self, name: str, drawn: Axes | Figure, caption: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-        """A picture name.png, and what it shows as name.csv."""
+        """A picture report_name.png, and what it shows as report_name.csv."""
+        name = f"report_{name}"
         picture = drawn if isinstance(drawn, Figure) else drawn.figure
         picture.savefig(self.folder / f"{name}.png", dpi=110)  # type: ignore[union-attr]
         with (self.folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
@@ -161,8 +162,9 @@ def _scene(page: Page, scene: Scene) -> None:
     values += [(name.replace("_", " "), getattr(rod, name)) for name in ("bending_stiffness", "radius")]
     page.add(
         "# N rolling discs and the rod they become",
-        "N vertical discs roll on a plane without sliding, joined by springs that resist bending and torsion. As N grows they become "
-        "the nonholonomic Cosserat rod of J. Vankerschaver. A straight rod at rest is twisted by θ = −(π/2) cos(πs/ℓ) and let go.",
+        "N vertical discs roll on a plane without sliding, joined by springs that resist bending and torsion. As N grows they "
+        "become the nonholonomic Cosserat rod of J. Vankerschaver. A straight rod at rest is twisted by θ = −(π/2) cos(πs/ℓ) and "
+        "let go.",
         "## The scene",
         table(("quantity", "value"), values),
         f"Time runs to {scene.duration:g}. {'; '.join(f'{law} law: {words}' for law, words in LAWS.items())}.",
@@ -233,11 +235,11 @@ def _speed(page: Page, scene: Scene, n: int) -> None:
 
 def _stability(page: Page, executor: Executor, progress: bool) -> None:
     found = stability(quick=True, executor=executor, progress=progress)
-    found.save(page.folder / "stability_runs.csv")
+    found.save(page.folder / "report_stability_runs.csv")
     drawn = found.plot()
     waves = found.waves
     page.add("## Hard cases", "Small ones; `python -m compare stability` runs all.", found.summary(), found.words, found.grid())
-    page.add("All runs: [stability_runs.csv](stability_runs.csv).")
+    page.add("All runs: [report_stability_runs.csv](report_stability_runs.csv).")
     rows = zip(waves.q, waves.relation, waves.measured, strict=True) if waves else ()
     caption = "Energy at steps far above the explicit limit, and growing waves."
     page.figure("stability", drawn[0], caption, ("q", "growth by the relation", "growth measured"), rows)
