@@ -98,7 +98,8 @@ class Stability:
         return (
             "holds: to the end, energy (the number, relative) and where known positions within the bound. says so: off, with steps "
             "counted as unconverged or a warning. **LOST**: off, without a word. stops, refused: an error with time and disc, or "
-            "before the start. fails: a peer's error. cut off: too slow. Bold: not as expected of ours. "
+            "before the start. fails: a peer's error. cut off: too slow. †: some steps did not converge, and are counted. Bold: not as "
+            "expected of ours. "
             f"auto runs to {TOL:g}, peers to rtol {RTOL:g}, their energy is that at the end; they keep rolling by their variables."
         )
 
@@ -207,4 +208,5 @@ def _cell(row: Row | None) -> str:
         return "·"
     f, word = row.found, MARK.get(row.verdict, row.verdict)
     number = f" t={f.t:.2g}" if row.verdict == "stopped" else f" {_short(f.energy)}" if f.outcome == "done" else ""
+    number += "†" if f.unconverged else ""
     return f"**{word}{number}**" if row.expected == "NO" else word + number
