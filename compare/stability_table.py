@@ -98,8 +98,8 @@ class Stability:
         return (
             "holds: to the end, energy (the number, relative) and where known positions within the bound. says so: off, with steps "
             "counted as unconverged or a warning. **LOST**: off, without a word. stops, refused: an error with time and disc, or "
-            "before the start. fails: a peer's error. cut off: too slow. †: some steps did not converge, and are counted. Bold: not as "
-            "expected of ours. "
+            "before the start. fails: a peer's error. cut off: too slow. †: some steps did not converge, and are counted. Bold: "
+            "not as expected of ours. "
             f"auto runs to {TOL:g}, peers to rtol {RTOL:g}, their energy is that at the end; they keep rolling by their variables."
         )
 

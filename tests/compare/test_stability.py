@@ -71,7 +71,7 @@ def test_the_parasitic_mode_comes_sooner_with_more_discs(table):
     assert 7 < t65 < 9
 
 
-def test_waves_grow_as_the_relation_says(table):
+def test_waves_grow_as_the_relation_says():
     for law, n, stiffness, time_, bound in (
         ("field", 33, 0.7, 4.0, 0.005),
         ("field", 17, 0.0, 20 / 17, 0.005),
