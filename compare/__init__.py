@@ -3,6 +3,8 @@
 from compare.lump import lump
 from compare.main_job import overview
 from compare.precision import WorkPrecision, work_precision
+from compare.stability_table import Stability, stability
 from compare.study import Study, convergence
+from compare.sweeps import sweep
 
-__all__ = ["Study", "WorkPrecision", "convergence", "lump", "overview", "work_precision"]
+__all__ = ["Stability", "Study", "WorkPrecision", "convergence", "lump", "overview", "stability", "sweep", "work_precision"]

@@ -2,12 +2,14 @@
 
 import argparse
 import sys
+from pathlib import Path
 
-from compare import precision
+from compare import precision, report
 from compare.background import background
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
+from compare.stability_table import Stability, kept, stability
 from continuum import steered_rod, untwisting_rod
 from continuum.files import read_scene
 from discs import SimulationError
@@ -41,7 +43,21 @@ def parser() -> argparse.ArgumentParser:
     add_precision(
         commands.add_parser("precision", help="speed against error beside other integrators", description=precision.__doc__)
     )
+    add_stability(commands.add_parser("stability", help="hard cases by every method", description=stability.__doc__))
+    add_report(commands.add_parser("report", help="everything on one page", description=report.__doc__))
     return p
+
+
+def add_report(p: argparse.ArgumentParser) -> None:
+    """The options of `report`."""
+    p.add_argument(
+        "--out", metavar="DIR", default="out", help="folder for report.html, report.md, pictures and data (default: out)"
+    )
+    p.add_argument(
+        "--n", metavar="N", type=int, nargs="+", default=list(report.SIZES), help="numbers of discs (default: 17 ... 257)"
+    )
+    p.add_argument("--tol", metavar="TOL", type=float, default=1e-4, help="largest error of the fields (default: 1e-4)")
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
 def add_precision(p: argparse.ArgumentParser) -> None:
@@ -58,6 +74,40 @@ def add_precision(p: argparse.ArgumentParser) -> None:
     p.add_argument("--repeats", metavar="M", type=int, default=5, help="timed runs of each setting (default: 5)")
     p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run (default: 10)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
+
+
+def add_stability(p: argparse.ArgumentParser) -> None:
+    """The options of `stability`."""
+    p.add_argument(
+        "--out", metavar="DIR", default="out", help="folder for stability.md, stability.csv, stability.png (default: out)"
+    )
+    p.add_argument("--quick", action="store_true", help="small cases only: about a minute")
+    p.add_argument("--seconds", metavar="S", type=float, help="longest time for one run (default: 60; quick: 1)")
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
+
+
+def run_stability(options: argparse.Namespace) -> None:
+    """Run the hard cases and write table and picture; what an interrupted run has found is written too, and not lost."""
+    archive = Path(options.out) / "stability.jsonl"
+    try:
+        found = stability(options.quick, seconds=options.seconds, archive=archive, progress=not options.quiet)
+    except KeyboardInterrupt:
+        if archive.exists():
+            write_stability(kept(archive, options.quick), options.out)
+            print(f"interrupted: {options.out} holds what was found; the same command goes on", file=sys.stderr)
+        raise
+    write_stability(found, options.out)
+    archive.unlink()  # a later run measures again
+    print(found.grid(), found.summary(), sep="\n\n")
+    print(f"\nwritten to {options.out}: stability.md, stability.csv, stability.png")
+
+
+def write_stability(found: Stability, out: str) -> None:
+    """Table, runs and picture."""
+    with fresh_files(out) as folder:
+        found.save(folder / "stability.csv")
+        found.plot(folder / "stability.png")
+        (folder / "stability.md").write_text(found.report(), encoding="utf-8")
 
 
 def run_precision(options: argparse.Namespace) -> None:
@@ -80,6 +130,13 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if options.command == "precision":
             run_precision(options)
+            return 0
+        if options.command == "report":
+            report.report(options.out, options.n, options.tol, progress=not options.quiet)
+            print(f"written to {options.out}: report.html, report.md, pictures and their data")
+            return 0
+        if options.command == "stability":
+            run_stability(options)
             return 0
         if options.scene and options.rolling:
             raise ValueError("--rolling belongs to the default scene; a scene file says its own law with the key 'rolling'")

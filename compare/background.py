@@ -1,4 +1,4 @@
-"""One process beside this one, that ends with the work it helps."""
+"""Processes beside this one, that end with the work they help."""
 
 import signal
 import threading
@@ -11,9 +11,9 @@ from tqdm import tqdm
 
 
 @contextmanager
-def background() -> Iterator[Executor]:
-    """An executor of one process; what it still does when the block fails is stopped at once."""
-    with ProcessPoolExecutor(1, get_context("spawn"), _quietly) as executor:
+def background(processes: int = 1) -> Iterator[Executor]:
+    """An executor of so many processes; what they still do when the block fails is stopped at once."""
+    with ProcessPoolExecutor(processes, get_context("spawn"), _quietly) as executor:
         try:
             yield executor
         except BaseException:

@@ -18,7 +18,9 @@ from discs.figures import given_or_new
 from discs.style import BLUE, GREEN, GREY, ORANGE, PURPLE
 
 if TYPE_CHECKING:
+    from compare.hard_cases import Growth
     from compare.precision import WorkPrecision
+    from compare.stability_table import Stability
     from compare.study import Study
 
 LABEL = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
@@ -157,3 +159,37 @@ def precision(study: "WorkPrecision") -> list[Axes]:
     lines = [shown[m] for m in order]
     figure.legend(lines, order, loc="outside lower center", ncols=columns, fontsize="small", frameon=False)
     return list(grid.ravel())
+
+
+def stability(study: "Stability", growth: "Growth | None") -> list[Axes]:
+    """Energy error against h/k for each method, crosses where it stopped or was not converged, and the growth of waves on the
+    straight rolling rod."""
+    figure = Figure(figsize=(11.5, 4.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    rows = [row for row in study.rows if row.case == "step above the explicit limit"]
+    settings = list(dict.fromkeys(row.setting.split(",")[0] for row in rows))
+    colours = (BLUE, ORANGE, GREEN, PURPLE, "black", "#56B4E9", "#F0E442", "#A0522D", GREY)
+    for method, colour in zip(dict.fromkeys(row.method for row in rows), colours, strict=False):
+        run = [r for r in rows if r.method == method and r.setting.startswith(settings[-1])]
+        multiple = [float(r.setting.split("h = ")[1].split()[0]) for r in run]
+        drift = [max(r.found.energy, 1e-16) if r.found.outcome == "done" else np.nan for r in run]
+        if np.isfinite(drift).any():
+            left.loglog(multiple, drift, "o-", color=colour, label=method, markersize=4)
+        said = [(m, d) for m, d, r in zip(multiple, drift, run, strict=True) if r.found.unconverged]
+        left.loglog([m for m, _ in said], [d for _, d in said], "x", color=colour, markersize=9)
+    left.set_xlabel("h/k")
+    left.set_ylabel("relative error of the energy")
+    left.set_title(f"paper's scene, {settings[-1] if settings else ''}; × some steps unconverged", fontsize="medium")
+    left.grid(alpha=0.3)
+    if rows:
+        left.legend(fontsize=8)
+    if growth is not None:
+        right.plot(growth.q, growth.relation, "-", color=GREY, label="dispersion relation, 33 discs")
+        right.plot(growth.q, growth.measured, "o", color=BLUE, markersize=4, label="measured, midpoint")
+        right.legend(fontsize=8)
+    right.set_xlabel("wave number q")
+    right.set_ylabel("growth rate σ")
+    right.set_ylim(bottom=0)
+    right.set_title("straight rod rolling under the field law", fontsize="medium")
+    right.grid(alpha=0.3)
+    return [left, right]

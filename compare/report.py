@@ -1,0 +1,262 @@
+"""Everything on one page: the scene, its motion, N -> infinity, two laws of rolling, energy, speed, stability, versions."""
+
+import base64
+import csv
+import importlib.metadata
+import os
+import platform
+import re
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markdown_it import MarkdownIt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from tqdm import tqdm
+
+from compare import figures
+from compare.background import background
+from compare.main_job import INSTANTS, LONG, energy_runs
+from compare.outputs import fresh_files
+from compare.peers import reduced
+from compare.peers.reduced import Peer
+from compare.precision import work_precision
+from compare.stability_table import stability
+from compare.study import Study, convergence
+from continuum import Scene, solve, untwisting_rod
+from discs import Problem, Solution, checks
+
+SIZES = (17, 33, 65, 129, 257)
+LAWS = {"field": "the paper's law, ṙ = RωJr'", "unit": "true rolling, ṙ = RωJr'/|r'|"}
+PACKAGES = ("numpy", "scipy", "matplotlib", "numba", "scikit-sundae", "rolling-discs")
+
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>{title}</title>
+<link rel="icon" href="data:,">
+<style>
+body {{ font: 16px/1.5 sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #222; }}
+img {{ max-width: 100%; }}
+table {{ border-collapse: collapse; display: block; overflow-x: auto; font-size: 0.8rem; margin: 1rem 0; }}
+th, td {{ border: 1px solid #ccc; padding: 0.2rem 0.5rem; text-align: left; white-space: nowrap; }}
+strong {{ color: #b00; }}
+h1 strong, h2 strong {{ color: inherit; }}
+</style>
+</head>
+<body>
+{body}
+</body>
+</html>
+"""
+
+
+@dataclass
+class Page:
+    """A page in Markdown, with its pictures and their data as files beside it.
+
+    folder : for the files. parts : paragraphs.
+    """
+
+    folder: Path
+    parts: list[str] = field(default_factory=list)
+
+    def add(self, *paragraphs: str) -> None:
+        """Paragraphs, headings or tables, in Markdown."""
+        self.parts += paragraphs
+
+    def figure(self, name: str, drawn: Axes | Figure, caption: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+        """A picture report_name.png, and what it shows as report_name.csv."""
+        name = f"report_{name}"
+        picture = drawn if isinstance(drawn, Figure) else drawn.figure
+        picture.savefig(self.folder / f"{name}.png", dpi=110)  # type: ignore[union-attr]
+        with (self.folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(chain([columns], rows))
+        self.add(f"![{caption}]({name}.png)", f"{caption} Data: [{name}.csv]({name}.csv).")
+
+    def markdown(self) -> str:
+        """The page; its pictures are the files beside it."""
+        return "\n\n".join(self.parts) + "\n"
+
+    def html(self, title: str) -> str:
+        """The page with its pictures inside."""
+
+        def inlined(match: re.Match[str]) -> str:
+            return f'src="data:image/png;base64,{base64.b64encode((self.folder / match[1]).read_bytes()).decode()}"'
+
+        body = MarkdownIt("commonmark", {"html": False}).enable("table").render(self.markdown())
+        return PAGE.format(title=title, body=re.sub(r'src="([^":]+\.png)"', inlined, body))
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A table in Markdown."""
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
+def report(
+    out: str | Path, n: Sequence[int] = SIZES, tol: float = 1e-4, timed: int = 32, long: float = LONG, progress: bool = True
+) -> None:
+    """Write report.html, which needs nothing beside it, report.md, and every picture and its data.
+
+    Parameters
+    ----------
+    out : folder.
+    n : numbers of discs for N -> infinity.
+    tol : largest error of the fields.
+    timed : number of discs where speed is measured.
+    long : durations of the paper's scene over which the energy is shown.
+    progress : show progress bars.
+    """
+    checks.number("tol", tol, positive=True)
+    scenes = {law: untwisting_rod(rolling=law) for law in LAWS}
+    with (
+        fresh_files(out) as folder,
+        background() as beside,
+        tqdm(total=6, desc="report", bar_format="{desc} {n}/{total} {elapsed} {postfix}", disable=not progress) as bar,
+    ):
+
+        def stage(name: str) -> None:
+            bar.set_postfix_str(name)
+            bar.update()
+
+        page, sizes = Page(folder), tuple(n)
+        first = replace(scenes["field"], duration=long * scenes["field"].duration)
+        energies = beside.submit(energy_runs, first)
+        later = {law: _studied(scene, sizes, tol, beside) for law, scene in scenes.items()}
+        stage("the scene and its motion")
+        fields = {law: solve(scene, tol, frames=INSTANTS, progress=False) for law, scene in scenes.items()}
+        _scene(page, scenes["field"])
+        _motion(page, scenes, fields)
+        stage("N to infinity")
+        _limit(page, {law: [future.result() for future in futures] for law, futures in later.items()})
+        _laws(page, fields)
+        stage("energy")
+        _energy(page, energies.result(), first)
+        stage("speed against error")
+        _speed(page, scenes["field"], timed)
+        stage("stability")
+        _stability(page, beside, progress)
+        stage("page")
+        _machine(page)
+        title = "N rolling discs and the rod they become"
+        (folder / "report.md").write_text(page.markdown(), encoding="utf-8")
+        (folder / "report.html").write_text(page.html(title), encoding="utf-8")
+
+
+def _studied(scene: Scene, n: tuple[int, ...], tol: float, executor: Executor) -> list[Future[Study]]:
+    return [executor.submit(convergence, scene, n, ends, tol=tol, progress=False) for ends in ("springs", "consistent")]
+
+
+def _scene(page: Page, scene: Scene) -> None:
+    rod = scene.rod
+    values = [(name.replace("_", " "), getattr(rod, name)) for name in ("length", "density", "spin_inertia", "torsion_stiffness")]
+    values += [(name.replace("_", " "), getattr(rod, name)) for name in ("bending_stiffness", "radius")]
+    page.add(
+        "# N rolling discs and the rod they become",
+        "N vertical discs roll on a plane without sliding, joined by springs that resist bending and torsion. As N grows they "
+        "become the nonholonomic Cosserat rod of J. Vankerschaver. A straight rod at rest is twisted by θ = −(π/2) cos(πs/ℓ) and "
+        "let go.",
+        "## The scene",
+        table(("quantity", "value"), values),
+        f"Time runs to {scene.duration:g}. {'; '.join(f'{law} law: {words}' for law, words in LAWS.items())}.",
+    )
+
+
+def _motion(page: Page, scenes: dict[str, Scene], fields: dict[str, Solution]) -> None:
+    page.add("## The motion")
+    for law, run in fields.items():
+        error = max(run.error_estimate[f] for f in ("x", "y", "theta")) if run.error_estimate else np.nan
+        rows = [
+            (t, s, run.x[f, i], run.y[f, i], run.theta[f, i])
+            for f, t in enumerate(run.t)
+            for i, s in enumerate(run.s)
+            if i % max(1, run.s.size // 128) == 0
+        ]
+        caption = f"The field under the {law} law, off by {error:.1e} at most by its own estimate."
+        page.figure(f"motion_{law}", figures.motion(run, scenes[law]), caption, ("t", "s", "x", "y", "theta"), rows)
+
+
+def _limit(page: Page, studies: dict[str, list[Study]]) -> None:
+    page.add("## N → ∞", "Plain springs lose an order at the free ends; consistent ends win it back.")
+    for law, pair in studies.items():
+        rows = [row for study in pair for row in study.rows()]
+        page.figure(f"convergence_{law}", figures.convergence(pair), f"Discs against the {law} law's field.", pair[0].columns, rows)
+        page.add(table(pair[0].columns, rows))
+
+
+def _laws(page: Page, fields: dict[str, Solution]) -> None:
+    a, b = fields.values()
+    count = min(a.s.size, b.s.size) - 1
+    every = [(run.s.size - 1) // count for run in (a, b)]
+    distance = np.array(
+        [np.abs(getattr(a, f)[:, :: every[0]] - getattr(b, f)[:, :: every[1]]).max(axis=1) for f in ("x", "y", "theta")]
+    )
+    ax = Figure(figsize=(6.8, 4.0), layout="constrained").subplots()
+    for name, row in zip(("x", "y", "θ"), distance, strict=True):
+        ax.plot(a.t, row, "o-", label=name)
+    ax.set_xlabel("time t")
+    ax.set_ylabel("largest distance (length, rad)")
+    ax.legend()
+    ax.grid(alpha=0.3)
+    page.add("## The paper's law against true rolling", "They agree while |r'| = 1, and the model lets |r'| drift.")
+    rows = [(f"{t:g}", *(f"{d:.3g}" for d in at)) for t, at in zip(a.t, distance.T, strict=True)]
+    page.figure("laws", ax, "Distance between the two fields.", ("t", "x", "y", "theta"), rows)
+
+
+def _energy(page: Page, runs: dict[str, Solution], scene: Scene) -> None:
+    rows = [(label, t, e) for label, run in runs.items() for t, e in zip(run.t, run.energy, strict=True)]
+    words = [f"{label}: {np.abs(run.energy / run.energy[0] - 1).max():.1e}" for label, run in runs.items()]
+    page.add(f"## Energy over [0, {scene.duration:g}]", f"Largest relative error: {'; '.join(words)}.")
+    page.figure("energy", figures.energy(runs), "Energy of two methods.", ("method", "t", "energy"), rows)
+
+
+def speed_peers(problem: Problem) -> list[Peer]:
+    """The peers that take the compiled right-hand side."""
+    f = reduced.Bound(problem)
+    return reduced.scipy_peers(problem, f) + (reduced.sundials_peers(problem, f) if find_spec("sksundae") else [])
+
+
+def _speed(page: Page, scene: Scene, n: int) -> None:
+    found = work_precision({"paper's scene": scene}, (n,), speed_peers, repeats=3, seconds=1.0, progress=False)
+    rows = [(r.method, r.setting, r.error, r.seconds, r.remark) for r in found.rows]
+    page.add("## Speed against error", "`python -m compare precision` measures more sizes, laws and peers.", found.speedups())
+    caption = f"Our methods in colour, SciPy's and SUNDIALS' in grey, N = {n}."
+    page.figure("precision", found.plot()[0], caption, ("method", "setting", "error", "seconds", "remark"), rows)
+
+
+def _stability(page: Page, executor: Executor, progress: bool) -> None:
+    found = stability(quick=True, executor=executor, progress=progress)
+    found.save(page.folder / "report_stability_runs.csv")
+    drawn = found.plot()
+    waves = found.waves
+    page.add("## Hard cases", "Small ones; `python -m compare stability` runs all.", found.summary(), found.words, found.grid())
+    page.add("All runs: [report_stability_runs.csv](report_stability_runs.csv).")
+    rows = zip(waves.q, waves.relation, waves.measured, strict=True) if waves else ()
+    caption = "Energy at steps far above the explicit limit, and growing waves."
+    page.figure("stability", drawn[0], caption, ("q", "growth by the relation", "growth measured"), rows)
+
+
+def _machine(page: Page) -> None:
+    versions = [(name, importlib.metadata.version(name)) for name in PACKAGES if _installed(name)]
+    system = [
+        ("Python", platform.python_version()),
+        ("machine", f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"),
+    ]
+    page.add("## Made with", table(("what", "version"), [*system, *versions]))
+
+
+def _installed(name: str) -> bool:
+    try:
+        importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True

@@ -1,0 +1,212 @@
+"""What each method survives and where it fails: every hard case by every method, in one table."""
+
+import csv
+from collections.abc import Iterable
+from concurrent.futures import Executor
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from compare import figures
+from compare.background import background
+from compare.hard_cases import OURS, PEERS, RTOL, TOL, Case, Found, Growth, cases, rolling_waves
+from compare.sweeps import Result, read, sweep
+from discs import checks
+
+SECONDS = {True: 1.0, False: 60.0}  # that a run may take: quick, or not
+MARK = {"holds": "holds", "says so": "says so", "lost": "LOST", "refused": "refused", "stopped": "stops", "failed": "fails"}
+
+
+class Row(NamedTuple):
+    """One method on one case: see `compare.hard_cases.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or "" of
+    peers and where nothing was seen."""
+
+    case: str
+    setting: str
+    method: str
+    verdict: str
+    expected: str
+    found: Found
+
+
+@dataclass(frozen=True, eq=False)
+class Stability:
+    """Hard cases by methods.
+
+    Attributes
+    ----------
+    rows : one for each case and method.
+    cases : the cases, in their order.
+    """
+
+    rows: list[Row]
+    cases: list[Case]
+
+    @property
+    def failures(self) -> list[Row]:
+        """What ours did not do as expected."""
+        return [row for row in self.rows if row.expected == "NO"]
+
+    def grid(self) -> str:
+        """Cases by methods, as a table in Markdown; bold is what ours did not do as expected."""
+        at = {(row.case, row.setting, row.method): row for row in self.rows}
+        methods = [m for m in (*OURS, *PEERS) if any(row.method == m for row in self.rows)]
+        lines = [f"| case | {' | '.join(methods)} |", "| --- " * (len(methods) + 1) + "|"]
+        for case in self.cases:
+            cells = [_cell(at.get((case.name, case.setting, m))) for m in methods]
+            if any(cell != "·" for cell in cells):
+                lines.append(f"| {case.name}: {case.setting} | {' | '.join(cells)} |")
+        return "\n".join(lines)
+
+    def table(self) -> str:
+        """All runs, as a table in Markdown."""
+        head = "case", "method", "as expected", "result", "t", "h", "error", "energy", "slip", "unconverged", "steps", "s", "remark"
+        lines = [f"| {' | '.join(head)} |", "| --- " * len(head) + "|"]
+        for row in self.rows:
+            f = row.found
+            numbers = [_short(v) for v in (f.t, f.dt, f.error, f.energy, f.residual)]
+            says = " ".join(part for part in (f.note, f.says) if part).replace("\n", " ").replace("|", "\\|")
+            cells = [
+                f"{row.case}: {row.setting}",
+                row.method,
+                row.expected,
+                row.verdict,
+                *numbers,
+                str(f.unconverged),
+                str(f.steps),
+            ]
+            lines.append(f"| {' | '.join([*cells, _short(f.seconds), says[:160]])} |")
+        return "\n".join(lines)
+
+    def summary(self) -> str:
+        """What ours did not do as expected, in lines of Markdown."""
+        told = [r for r in self.rows if r.expected]
+        lines = [f"{len(told)} runs of ours, {len(self.failures)} not as expected{':' if self.failures else '.'}"]
+        for row in self.failures:
+            f = row.found
+            how = f"{row.verdict}, error {_short(f.error)}, energy {_short(f.energy)}"
+            lines.append(f"* {row.case}, {row.setting}, `{row.method}`: {how} {f.note} {f.says[:120]}".rstrip())
+        return "\n".join(lines)
+
+    @property
+    def words(self) -> str:
+        """What the words of the grid mean."""
+        return (
+            "holds: to the end, energy (the number, relative) and where known positions within the bound. says so: off, with steps "
+            "counted as unconverged or a warning. **LOST**: off, without a word. stops, refused: an error with time and disc, or "
+            "before the start. fails: a peer's error. cut off: too slow. †: some steps did not converge, and are counted. Bold: "
+            "not as expected of ours. "
+            f"auto runs to {TOL:g}, peers to rtol {RTOL:g}, their energy is that at the end; they keep rolling by their variables."
+        )
+
+    def report(self) -> str:
+        """Everything, in Markdown."""
+        wants = dict.fromkeys(f"* **{c.name}**: {c.what}. {c.expectation.kind}: {c.expectation.words}." for c in self.cases)
+        parts = ["# Hard cases", self.summary(), self.words, self.grid(), "## What is expected", "\n".join(wants), "## All runs"]
+        return "\n\n".join([*parts, self.table()])
+
+    def save(self, path: str | Path) -> None:
+        """All runs, as CSV."""
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow([*Row._fields[:-1], *Found._fields])
+            writer.writerows([*row[:-1], *row.found] for row in self.rows)
+
+    @cached_property
+    def waves(self) -> Growth | None:
+        """Growth on the straight rod rolling under the field law, by midpoint, for the figure."""
+        return rolling_waves(33, "field", 0.7, 4.0, "midpoint", np.inf)[1]
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
+        axes = figures.stability(self, self.waves)
+        if path is not None:
+            figures.save(axes[0], path)
+        return axes
+
+
+def stability(
+    quick: bool = False,
+    names: Iterable[str] | None = None,
+    methods: Iterable[str] | None = None,
+    seconds: float | None = None,
+    executor: Executor | None = None,
+    archive: str | Path | None = None,
+    progress: bool = True,
+) -> Stability:
+    """Run hard cases by every method: steps far above the explicit limit, long times, parasitic modes, growing waves, ill-posed and
+    collapsing motions, rough starts, extreme parameters, few and many discs.
+
+    Parameters
+    ----------
+    quick : small cases only, for a minute.
+    names : of the cases, as `compare.hard_cases` has them; all by default.
+    methods : names of ours and of peers; all by default.
+    seconds : a run that takes longer is cut off; 60, or 1 if quick.
+    executor : as for `sweep`; by default one process beside this one, so that times mean something.
+    archive : file to keep results in, and to resume from.
+    progress : show a progress bar.
+
+    Raises
+    ------
+    ValueError : for unknown names or methods, or seconds that are not positive.
+    """
+    listed = cases(quick)
+    known = tuple(dict.fromkeys(case.name for case in listed))
+    chosen = known if names is None else tuple(checks.choice("names", name, known) for name in names)
+    by = (*OURS, *PEERS) if methods is None else tuple(checks.choice("methods", m, (*OURS, *PEERS)) for m in methods)
+    limit = SECONDS[quick] if seconds is None else checks.number("seconds", seconds, positive=True)
+    listed = [case for case in listed if case.name in chosen]
+    todo = [_order(c, m, quick, limit) for c in listed for m in by if m in c.methods]
+    with nullcontext(executor) if executor else background() as worker:
+        return tabulated(sweep(_run, todo, worker, archive, progress), listed)
+
+
+def kept(archive: str | Path, quick: bool) -> Stability:
+    """What an interrupted run has left in its archive."""
+    found = [result for result in read(archive) if result.case["quick"] == quick]
+    return tabulated(found, cases(quick))
+
+
+def tabulated(results: list[Result], listed: list[Case]) -> Stability:
+    """The table of a sweep's results."""
+    by_key, rows = {case.key: case for case in listed}, []
+    for result in results:
+        case, method = by_key[result.case["case"]], result.case["method"]
+        found = Found(**result.value) if result.value else Found("failed", says=result.error, seconds=result.seconds)
+        met = case.expectation.met(method, found)
+        expected = "" if met is None else "yes" if met else "NO"
+        rows.append(Row(case.name, case.setting, method, case.expectation.verdict(method, found), expected, found))
+    return Stability(rows, listed)
+
+
+def _order(case: Case, method: str, quick: bool, seconds: float) -> dict[str, Any]:
+    return {"case": case.key, "method": method, "quick": quick, "seconds": seconds}
+
+
+@cache
+def _listed(quick: bool) -> dict[str, Case]:
+    return {case.key: case for case in cases(quick)}
+
+
+def _run(order: dict[str, Any]) -> dict[str, Any]:
+    """A run, in whatever process; cases are found by their names, as they cannot be sent as JSON."""
+    return _listed(order["quick"])[order["case"]].run(order["method"], order["seconds"])._asdict()
+
+
+def _short(value: float) -> str:
+    return "–" if not np.isfinite(value) else f"{value:.2g}"
+
+
+def _cell(row: Row | None) -> str:
+    """A verdict and the number that goes with it."""
+    if row is None:
+        return "·"
+    f, word = row.found, MARK.get(row.verdict, row.verdict)
+    number = f" t={f.t:.2g}" if row.verdict == "stopped" else f" {_short(f.energy)}" if f.outcome == "done" else ""
+    number += "†" if f.unconverged else ""
+    return f"**{word}{number}**" if row.expected == "NO" else word + number

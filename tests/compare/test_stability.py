@@ -1,0 +1,203 @@
+"""Hard cases: each expectation is met at small size, a failure is shown as one, and interrupted tables go on."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from compare import lump, stability
+from compare.__main__ import main
+from compare.hard_cases import OURS, PEERS, Expectation, Found, cases, rolling_waves
+from compare.stability_table import kept
+from continuum import untwisting_rod
+from continuum.dispersion import growth
+from continuum.scenes import rolling_rod
+from discs import simulate
+
+SMALL = cases(quick=True)
+# the paper's scheme cannot keep what is expected: its parasitic mode; Runge and Kutta's damps the waves it does not resolve
+LOST = {
+    ("long time", "leapfrog"),
+    ("parasitic mode", "leapfrog"),
+    ("strong twist", "leapfrog"),
+    ("folded line", "leapfrog"),
+    ("rolling straight rod, unit law", "rk4"),
+}
+
+
+@pytest.fixture(scope="module")
+def table():
+    with ThreadPoolExecutor(1) as here:
+        return stability(quick=True, methods=("midpoint", "gauss6", "leapfrog", "rk4"), seconds=5.0, executor=here, progress=False)
+
+
+def test_ours_do_as_expected_but_for_what_is_known(table):
+    failed = {(row.case, row.method) for row in table.failures}
+    assert failed <= LOST
+    assert {("long time", "leapfrog"), ("parasitic mode", "leapfrog")} <= failed
+    for case in SMALL:
+        if "midpoint" in case.methods:
+            (row,) = (r for r in table.rows if (r.case, r.setting, r.method) == (case.name, case.setting, "midpoint"))
+            assert row.expected == "yes", (case.key, row)
+
+
+def one(table, name, setting, method):
+    (row,) = (r for r in table.rows if (r.case, r.method) == (name, method) and r.setting.startswith(setting))
+    return row
+
+
+def test_explicit_methods_above_their_limit_stop_and_name_time_and_disc(table):
+    for row in (r for r in table.rows if r.case == "step above the explicit limit"):
+        if row.method in ("leapfrog", "rk4"):
+            assert row.verdict == "stopped"
+            assert row.found.t > 0
+            assert "above the stability limit" in row.found.says
+            assert "disc" in row.found.says
+        elif row.found.outcome == "done":
+            assert row.found.energy < 1e-11
+
+
+def test_the_parasitic_mode_comes_sooner_with_more_discs(table):
+    onsets = [one(table, "parasitic mode", f"N = {n}", "leapfrog").found.note for n in (17, 33, 65)]
+    assert "from" not in onsets[0]
+    t33, t65 = (float(note.split("t = ")[1]) for note in onsets[1:])
+    assert 30 < t33 < 45  # measured 37.5 and 8 by another sampling
+    assert 7 < t65 < 9
+
+
+def test_waves_grow_as_the_relation_says():
+    for law, n, stiffness, time_, bound in (
+        ("field", 33, 0.7, 4.0, 0.005),
+        ("field", 17, 0.0, 20 / 17, 0.005),
+        ("unit", 17, 0.7, 4.0, 0.005),
+    ):
+        _, waves = rolling_waves(n, law, stiffness, time_, "gauss6", np.inf, 0.1)
+        rod = rolling_rod(bending_stiffness=stiffness, radius=0.7, density=1.3, spin_inertia=0.6).rod
+        np.testing.assert_allclose(waves.relation, growth(rod, waves.q, 1.0, law, rod.length / n))
+        np.testing.assert_allclose(waves.measured, waves.relation, atol=bound)
+        assert waves.q[-1] > 0.9 * np.pi * n / rod.length
+
+
+def test_the_limp_rod_is_said_to_be_ill_posed(table):
+    for n in (17, 33):
+        assert "ill posed" in one(table, "limp rolling rod, field law", f"N = {n}", "midpoint").found.says
+
+
+def test_the_ring_stops_in_time(table):
+    for method in ("midpoint", "gauss6", "leapfrog", "rk4"):
+        found = one(table, "collapsing ring, unit law", "N = 32", method).found
+        assert "lost its heading" in found.says
+        assert found.error < 0.03  # a step, and the last 1e-3 of the slope
+
+
+def test_a_rod_without_radius_is_refused_or_exact(table):
+    found = one(table, "extreme parameters", "R = 0", "gauss6").found
+    assert found.outcome == "refused" or found.error < 1e-6
+
+
+def test_rounding(table):
+    assert one(table, "rounding", "N = 1025", "midpoint").found.error < 1e-9
+
+
+def test_peers(tmp_path):
+    """A peer's run is the same motion, its energy that at the end."""
+    (case,) = (c for c in SMALL if c.setting == "N = 3")
+    for name in PEERS:
+        found = case.run(name, 10.0)
+        assert found.outcome in ("done", "-")
+        if found.outcome == "done":
+            assert found.error < 1e-3
+            assert 1e-13 < found.energy < 1e-4
+    (long,) = (c for c in SMALL if c.name == "long time")
+    assert long.run("SciPy BDF", 0.05).outcome == "cut off"
+
+
+def test_verdicts():
+    exact = Expectation("exact", "", energy=1e-10, error=0.1, must=("midpoint",))
+    good, off = Found("done", energy=1e-12, error=0.01), Found("done", energy=0.5)
+    assert exact.verdict("midpoint", good) == "holds"
+    assert exact.met("midpoint", good) is True
+    assert exact.met("midpoint", Found("done", energy=1e-9)) is False
+    assert exact.met("rk4", Found("done", energy=1e-9)) is True
+    assert exact.verdict("rk4", off) == "lost"
+    assert exact.met("rk4", off) is False
+    assert exact.met("rk4", off._replace(unconverged=1)) is True
+    assert exact.verdict("rk4", Found("done", energy=np.nan)) == "lost"
+    assert exact.verdict("rk4", good._replace(error=0.2)) == "lost"
+    assert exact.met("rk4", Found("stopped")) is True
+    assert exact.met("midpoint", Found("stopped")) is False
+    assert exact.met("SciPy BDF", off) is None
+    assert exact.met("midpoint", Found("cut off")) is None
+    refuse = Expectation("must refuse", "")
+    assert refuse.met("midpoint", good) is False
+    assert refuse.met("midpoint", Found("stopped")) is True
+    assert exact.met("rk4", Found("refused")) is False
+
+
+def test_a_failing_method_is_shown_as_one(monkeypatch):
+    """A kernel that loses energy: bold in the grid, and told in the summary."""
+    import compare.hard_cases
+
+    def leaky(problem, *arguments, **keywords):
+        run = simulate(problem, *arguments, **keywords)
+        run.energy[-1] *= 1.5
+        return run
+
+    monkeypatch.setattr(compare.hard_cases, "simulate", leaky)
+    with ThreadPoolExecutor(1) as here:
+        found = stability(True, names=("rough random roll",), methods=("midpoint",), seconds=9.0, executor=here, progress=False)
+    assert found.failures
+    assert "**LOST 0.5**" in found.grid()
+    assert "1 not as expected:\n* rough random roll, N = 65, `midpoint`: lost" in found.summary()
+
+
+def test_table_has_every_case_and_method():
+    keys = [case.key for case in cases()]
+    assert len(set(keys)) == len(keys)
+    assert {case.name for case in cases()} == {case.name for case in SMALL}
+    assert all(case.what and case.expectation.words for case in SMALL)
+    everywhere = [case for case in SMALL if case.methods == (*OURS, *PEERS)]
+    assert len(everywhere) > 12
+    assert simulate(lump(untwisting_rod(duration=0.1), 9), "midpoint", progress=False).stats["method"] in OURS
+
+
+def test_command_line(tmp_path, capsys, monkeypatch):
+    few = [c for c in cases(True) if c.name in ("few discs", "step above the explicit limit")]
+    monkeypatch.setattr("compare.stability_table.cases", lambda quick: few)
+    monkeypatch.setattr("compare.stability_table.background", lambda: ThreadPoolExecutor(1))
+    monkeypatch.setattr("compare.stability_table._listed", lambda quick: {c.key: c for c in few})
+    assert main(["stability", "--quick", "--quiet", "--out", str(tmp_path)]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["stability.csv", "stability.md", "stability.png"]
+    assert "refused" in capsys.readouterr().out
+    rows = list(csv.DictReader((tmp_path / "stability.csv").read_text(encoding="utf-8").splitlines()))
+    assert {row["case"] for row in rows} == {c.name for c in few}
+    assert "## What is expected" in (tmp_path / "stability.md").read_text(encoding="utf-8")
+
+
+def test_an_interrupt_keeps_what_is_there(tmp_path):
+    command = [sys.executable, "-m", "compare", "stability", "--quick", "--quiet", "--out", str(tmp_path)]
+    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    archive, begun = tmp_path / "stability.jsonl", time.monotonic()
+    while not archive.exists() or len(kept(archive, True).rows) < 5:
+        time.sleep(0.05)
+        assert run.poll() is None
+        assert time.monotonic() - begun < 60
+    os.killpg(run.pid, signal.SIGINT)  # as a terminal sends it
+    assert "holds what was found" in run.communicate(timeout=60)[1]
+    assert run.returncode == 130
+    assert len(list(csv.DictReader((tmp_path / "stability.csv").read_text(encoding="utf-8").splitlines()))) >= 5
+
+
+def test_bad_input():
+    with pytest.raises(ValueError, match="names must be one of 'step above"):
+        stability(names=("easy",))
+    with pytest.raises(ValueError, match="methods must be one of 'midpoint'"):
+        stability(methods=("euler",))
+    with pytest.raises(ValueError, match="seconds must be a positive finite number"):
+        stability(seconds=0)
