@@ -110,7 +110,7 @@ def simulate(
         **vars(march.work),
         "seconds": clock.perf_counter() - started,
     }
-    return Solution(t=times, s=problem.chain.s, stats=stats, **rows)
+    return Solution(t=times, s=problem.chain.s, stats=stats, problem=problem, **rows)
 
 
 def _extras(system: RollingDiscs, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:
