@@ -5,6 +5,7 @@ attributes (parameters that differ from disc to disc as variables), and a checks
 """
 
 import json
+import shutil
 import zlib
 from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
@@ -95,7 +96,7 @@ def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, NDArray]]:
     given = {f.name: getattr(chain, f.name) for f in fields(chain)}
     given |= {f"initial_{f.name}": getattr(initial, f.name) for f in fields(initial)}
     arrays = {name: value for name, value in given.items() if isinstance(value, np.ndarray)}
-    equal = {name: float(value[0]) for name, value in arrays.items() if not (bits := value.view(np.int64) - value.view(np.int64)[0]).any()}
+    equal = {name: float(value[0]) for name, value in arrays.items() if (value.view(np.int64) == value.view(np.int64)[0]).all()}
     told = {name: value for name, value in given.items() if name not in arrays} | equal
     told = {"chain": type(chain).__name__, **told, "duration": problem.duration}
     return told, {name: value for name, value in arrays.items() if name not in equal}
@@ -217,6 +218,18 @@ def save(run: Solution, path: str | Path) -> None:
             for f in range(run.t.size):
                 file.write(f, {name: value[f] for name, value in rows.items()})
             file.flush()
+
+
+def finish(path: str | Path, stats: dict[str, Any]) -> None:
+    """Say in the file of a run that it is complete, and its stats; in a copy that takes its place."""
+    import h5py
+
+    from discs.framefile import fresh
+
+    with fresh(path) as temporary:
+        shutil.copyfile(path, temporary)
+        with h5py.File(temporary, "r+") as file:
+            file.attrs["stats"], file.attrs["complete"] = as_text(stats), 1
 
 
 def load(path: str | Path) -> Solution:

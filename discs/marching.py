@@ -96,6 +96,19 @@ class March:
             notice.cancel()
         _PREPARED.add(key)
 
+    def keep(self) -> dict[str, Any]:
+        """All that the run goes on from, as arrays and numbers by name."""
+        work = {f"work.{name}": value for name, value in vars(self.work).items()}
+        return {"step": self.step} | work | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
+
+    def recall(self, kept: dict[str, Any]) -> None:
+        """Go on from what was kept of the same run."""
+        self.step = int(kept["step"])
+        for name in vars(self.work):
+            setattr(self.work, name, int(kept[f"work.{name}"]))
+        of_memory = {name.removeprefix("memory."): value for name, value in kept.items() if name.startswith("memory.")}
+        self.memory = self.integrator.recall(self.memory, of_memory)
+
     def to(self, step: int) -> Iterator[int]:
         """Go on to a step; yields how many steps were taken at a time."""
         while self.step < step:
