@@ -10,6 +10,7 @@ from tqdm import tqdm
 from continuum.elements import solve_elements
 from continuum.mesh import semidiscretise
 from continuum.rod import Scene
+from continuum.told import tells_scene
 from discs import Midpoint, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.simulation import frame_times
 
@@ -19,6 +20,7 @@ FINEST = 8193
 MOST_STEPS = 25 * 2**12
 
 
+@tells_scene
 def solve(
     scene: Scene,
     tol: float = 1e-5,

@@ -110,7 +110,9 @@ def rebuild(told: dict[str, Any], arrays: dict[str, NDArray]) -> Problem:
     state = {name: given.pop(name) for name in INITIAL if name in given}
     chain = kind(**given)
     return Problem(
-        chain, State(**{k.removeprefix("initial_"): v if v is None else np.broadcast_to(v, (n,)) for k, v in state.items()}), duration
+        chain,
+        State(**{k.removeprefix("initial_"): v if v is None else np.broadcast_to(v, (n,)) for k, v in state.items()}),
+        duration,
     )
 
 
@@ -136,7 +138,7 @@ def header(
     static = {"time": times, "s": s} | arrays
     attrs: dict[str, Any] = {
         "format": FORMAT,
-        "title": f"{s.size} rolling discs" if problem is not None else f"a rod on {s.size} nodes",
+        "title": f"a rod on {s.size} nodes" if "scene" in stats else f"{s.size} rolling discs",
         "unit_system": UNITS,
         "problem": as_text(told),
         "method": str(stats.get("method")),

@@ -25,17 +25,24 @@ NUMBER, COUNT = np.dtype("<f8"), np.dtype("<i8")
 NEEDED = ("time", "s", "checksum", "x", "y", "theta", "omega", "energy")
 
 
+def check_writable(path: Path) -> None:
+    """Raise ValueError if no file can be made at `path`."""
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(0, "it is a folder")
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path} cannot be written: {getattr(error, 'strerror', error)}") from None
+
+
 @contextmanager
 def fresh(path: str | Path) -> Iterator[str]:
     """A file to write beside `path`, which takes its place when the block ends well and vanishes when it does not."""
     path = Path(path)
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-        os.close(handle)
-        if path.is_dir():
-            raise IsADirectoryError(0, "it is a folder")
-    except OSError as error:
-        raise ValueError(f"{path} cannot be written: {error.strerror}") from None
+    check_writable(path)
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    os.close(handle)
     try:
         umask = os.umask(0)
         os.umask(umask)
@@ -203,7 +210,9 @@ class FrameFile:
                 raise ValueError(f"{name} is missing")
         sizes = {"axis": (2,), "disc": self._places["s"][1], "time": self._places["time"][1]}
         for name, (_, shape) in self._places.items():
-            need = tuple(sizes.get(d, shape[i : i + 1])[0] for i, d in enumerate(("time",) if name == "checksum" else dimensions(name)))
+            need = tuple(
+                sizes.get(d, shape[i : i + 1])[0] for i, d in enumerate(("time",) if name == "checksum" else dimensions(name))
+            )
             if shape != need or not np.prod(shape):
                 raise ValueError(f"{name} has the shape {shape}, not {need}")
         if archive.header_checksum(self.attrs, self.static) != self.attrs["checksum"]:

@@ -118,7 +118,10 @@ class March:
 
     def frame(self, tau: float) -> Frame:
         """The discs a time 0 <= tau < h after the last step."""
-        frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)
+        try:
+            frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)
+        except ArithmeticError as error:
+            raise self._gave_up(error) from None
         if tau:
             time = self.step * self.h + tau
             moved = Phase(frame.hi, frame.lo, frame.rate)
@@ -142,9 +145,15 @@ class March:
 
     def _plain(self) -> int:
         integrator, system, h = self.integrator, self.system, self.h
-        previous, self.memory = self.memory, integrator.advance(system, self.memory, h, self.work)
+        try:
+            previous, self.memory = self.memory, integrator.advance(system, self.memory, h, self.work)
+        except ArithmeticError as error:
+            raise self._gave_up(error) from None
         self._check(system.lost_heading(previous, self.memory), self.step + 1)
         return 1
+
+    def _gave_up(self, error: ArithmeticError) -> SimulationError:
+        return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)
 
     def _compiled(self, steps: int) -> int:
         self.memory, tally = self.integrator.march(self.kernel, self.memory, self.h, steps, self.bound)

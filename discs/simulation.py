@@ -72,7 +72,9 @@ def simulate(
         if dt is not None:
             raise ValueError("give dt or tol, not both: tol (and method='auto') finds the step")
         if checkpoint is not None:
-            raise ValueError("a checkpoint keeps one run, and tol (or method='auto') makes several: give a method and dt, or save the run")
+            raise ValueError(
+                "a checkpoint keeps one run, and tol (or method='auto') makes several: give a method and dt, or save the run"
+            )
 
         def run(integrator: Integrator, dt: float, times: NDArray) -> Solution:
             return simulate(problem, integrator, dt, times, want, progress, engine)
@@ -86,7 +88,9 @@ def simulate(
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     times = frame_times(frames, problem.duration)
     if times[-1] / h > MOST_STEPS:
-        raise ValueError(f"dt = {h:g} makes {times[-1] / h:.1g} steps to t = {times[-1]:g}, more than can be counted: take a larger dt")
+        raise ValueError(
+            f"dt = {h:g} makes {times[-1] / h:.1g} steps to t = {times[-1]:g}, more than can be counted: take a larger dt"
+        )
     system = problem.system
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
