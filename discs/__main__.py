@@ -23,14 +23,14 @@ def parser() -> argparse.ArgumentParser:
     """The options."""
     p = argparse.ArgumentParser(
         prog="python -m discs",
-        description="N rolling discs joined by springs. Any consistent units. Scenes from files: python -m continuum discs --scene FILE.toml.",
+        description="N rolling discs joined by springs. Any consistent units. Scenes from files: python -m continuum discs.",
     )
     commands = p.add_subparsers(metavar="COMMAND", title="commands", required=True, dest="command")
     run = commands.add_parser(
         "run",
         help="run the paper's twist",
-        description="A straight rod of discs, twisted by half a turn, lets go. With --save every frame is written as it comes; after "
-        "Ctrl-C or a crash the same command goes on where it was.",
+        description="A straight rod of discs, twisted by half a turn, lets go. With --save every frame is written as it comes; "
+        "after Ctrl-C or a crash the same command goes on where it was.",
     )
     run.add_argument("--t", metavar="T", type=float, default=DURATION, help=f"duration, time (default: {DURATION})")
     run.add_argument("--rolling", choices=("field", "unit", "own"), default="field", help="law; own: own headings (default: field)")

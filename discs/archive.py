@@ -1,7 +1,7 @@
 """Runs as files: NetCDF-4 that opens in plain xarray, written whole or not at all, read without trusting it.
 
 A file holds one variable for each quantity of a `Solution` over the dimensions (time, disc), what was computed as JSON in its
-attributes (parameters that differ from disc to disc as variables), and a checksum of each frame. Nothing in a file is ever executed.
+attributes (parameters that differ from disc to disc as variables), and a checksum of each frame. Nothing in a file is executed.
 """
 
 import json
@@ -106,14 +106,11 @@ def rebuild(told: dict[str, Any], arrays: dict[str, NDArray]) -> Problem:
     """The problem of `describe`; whatever does not make one is refused by it with a ValueError."""
     given = told | arrays
     kind = CHAINS[checks.choice("chain", given.pop("chain", None), CHAINS)]
-    duration, n = given.pop("duration", None), given.get("n")
-    state = {name: given.pop(name) for name in INITIAL if name in given}
+    duration, n = given.pop("duration", None), checks.whole("n", given.get("n"), 1)
+    state: dict[str, Any] = {name.removeprefix("initial_"): given.pop(name) for name in INITIAL if name in given}
     chain = kind(**given)
-    return Problem(
-        chain,
-        State(**{k.removeprefix("initial_"): v if v is None else np.broadcast_to(v, (n,)) for k, v in state.items()}),
-        duration,
-    )
+    full: dict[str, Any] = {name: None if value is None else np.broadcast_to(value, n) for name, value in state.items()}
+    return Problem(chain, State(**full), duration)
 
 
 # Datasets
@@ -156,7 +153,7 @@ def header_checksum(attrs: dict[str, Any], static: dict[str, NDArray]) -> int:
     """Of the problem, the times and the places."""
     total = zlib.crc32(attrs["problem"].encode())
     for name in sorted(static):
-        total = zlib.crc32(np.ascontiguousarray(static[name]), total)
+        total = zlib.crc32(np.ascontiguousarray(static[name]).data, total)
     return total
 
 
@@ -164,7 +161,7 @@ def frame_checksum(rows: dict[str, NDArray]) -> int:
     """Of what one frame records, by name; never zero."""
     total = 0
     for name in sorted(rows):
-        total = zlib.crc32(np.ascontiguousarray(rows[name]), total)
+        total = zlib.crc32(np.ascontiguousarray(rows[name]).data, total)
     return total + WROTE
 
 

@@ -1,8 +1,8 @@
 """The file of a run on disc: a NetCDF-4 file of fixed size whose frames are written in place.
 
-All variables are contiguous and have their room from the start, so the file is whole before the first frame is written, and a frame
-is written by the operating system at a known place, past the HDF5 library: nothing that kills the process can harm the file. A frame's
-checksum is written last; until then the frame does not count.
+All variables are contiguous and have their room from the start, so the file is whole before the first frame is written, and a
+frame is written by the operating system at a known place, past the HDF5 library: nothing that kills the process can harm the file.
+A frame's checksum is written last; until then the frame does not count.
 """
 
 import json
@@ -156,7 +156,7 @@ class FrameFile:
         )
 
     def _write(self, name: str, f: int, value: NDArray) -> None:
-        offset, left = self._places[name][0] + f * value.nbytes, memoryview(value.reshape(-1)).cast("B")
+        offset, left = self._places[name][0] + f * value.nbytes, value.reshape(-1).view(np.uint8).data
         while left:
             done = os.pwrite(self._fd, left, offset)
             offset, left = offset + done, left[done:]
@@ -184,7 +184,7 @@ class FrameFile:
     # What is in the file
 
     def _find(self) -> dict[str, tuple[int, tuple[int, ...]]]:
-        """Place in the file and shape of each variable; sets `attrs`. Only names, shapes, places and attributes are asked of HDF5."""
+        """Place in the file and shape of each variable; sets `attrs`. HDF5 is asked for names, shapes, places and attributes."""
         import h5py
 
         places = {}

@@ -1,7 +1,8 @@
 """Where the frames of a run go: into memory, or into a file from which an interrupted run goes on.
 
-Beside the file `run.nc` stands `run.nc.restart` while the run is not finished: what the integrator remembers, about once a second, in
-a file that replaces the one before. After a kill the run goes on from there and takes the frames since then again, to the same bits.
+Beside the file `run.nc` stands `run.nc.restart` while the run is not finished: what the integrator remembers, about once a second,
+in a file that replaces the one before. After a kill the run goes on from there and takes the frames since then again, to the same
+bits.
 """
 
 import signal
@@ -29,7 +30,7 @@ class Rows:
 
     def __init__(self, problem: Problem, times: NDArray) -> None:
         self.problem, self.times = problem, times
-        self.rows: dict[str, NDArray] = {}
+        self.rows: dict[str, Any] = {}
 
     def __enter__(self) -> "Rows":
         return self
