@@ -139,7 +139,9 @@ def test_other_things_in_the_way(tmp_path, monkeypatch):
         simulate(problem, tol=1e-3, checkpoint=tmp_path / "run.nc")
     stopped(monkeypatch, 9, problem, **settled, checkpoint=tmp_path / "run.nc")
     (tmp_path / "run.nc.restart").write_bytes(b"PK nonsense")
-    with pytest.raises(ValueError, match="run.nc.restart is damaged; without it the run starts from the beginning, so delete it"):
+    with pytest.raises(
+        ValueError, match=r"run\.nc\.restart is damaged; without it the run starts from the beginning, so delete it"
+    ):
         simulate(problem, **settled, checkpoint=tmp_path / "run.nc")
     (tmp_path / "run.nc.restart").unlink()
     equal(
@@ -156,7 +158,7 @@ def test_an_old_restart_file_is_not_of_a_new_run(tmp_path, monkeypatch):
 
 
 def test_frames_before_a_breakdown_are_kept(tmp_path):
-    problem = untwisting_chain(17)
+    problem = untwisting_chain(33)
     with pytest.raises(SimulationError, match="blew up"):
         simulate(problem, "leapfrog", 0.05, frames=46, engine="plain", checkpoint=tmp_path / "run.nc", progress=False)
     assert load(tmp_path / "run.nc").stats["frames_missing"] > 0
@@ -217,11 +219,11 @@ while killed < kills:
         finally:
             os._exit(0)
     os.close(tell)
-    time.sleep(draw.uniform(0.0, 0.4))
+    told = os.read(hear, 4) if draw.random() < 0.8 else b""  # most are killed after a frame, some while the file is made
+    time.sleep(draw.uniform(0.0, 0.3))
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
     killed += 1
-    told = b""
     while part := os.read(hear, 4096):
         told += part
     os.close(hear)
@@ -259,7 +261,7 @@ def test_same_input_same_bits():
     """In this process and in another."""
     code = (
         "from discs import simulate; from discs.twist import untwisting_chain;"
-        "runs = [simulate(untwisting_chain(16), method, 0.02, 3, engine=engine, progress=False)"
+        "runs = [simulate(untwisting_chain(16, duration=0.5), method, 0.02, 3, engine=engine, progress=False)"
         " for method, engine in (('midpoint', 'compiled'), ('gauss6', 'plain'), ('Radau', 'plain'))];"
         "found = ''.join(run.x.tobytes().hex() + run.theta.tobytes().hex() for run in runs)"
     )
@@ -268,3 +270,16 @@ def test_same_input_same_bits():
     done = subprocess.run([sys.executable, "-c", code + "; print(found)"], capture_output=True, text=True, check=True)
     assert here["found"] == done.stdout.strip()
     assert len(here["found"]) > 3000
+
+
+def test_engines_agree_to_some_ulps():
+    """At t = 4.5, in units in the last place of the largest value: measured 6 for positions and angles and 45 for rates (the two-step
+    scheme, 225 steps a unit of time: 62 and 54). Over the run each step adds roundings of a unit or so, of either sign."""
+    for rolling in ("field", "unit", "own"):
+        problem = untwisting_chain(16, rolling)
+        for method, dt, ulps in (("midpoint", 0.02, 16), ("gauss6", 0.05, 16), ("leapfrog", None, 128)):
+            a, b = (simulate(problem, method, dt, 2, progress=False, engine=engine) for engine in ("compiled", "plain"))
+            for name in (*problem.system.rows, "omega"):
+                one, other = getattr(a, name)[-1], getattr(b, name)[-1]
+                apart = np.abs(one - other).max() / np.spacing(np.abs(other).max())
+                assert apart <= (128 if name == "omega" else ulps), (rolling, method, name, apart)
