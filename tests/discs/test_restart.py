@@ -273,8 +273,8 @@ def test_same_input_same_bits():
 
 
 def test_engines_agree_to_some_ulps():
-    """At t = 4.5, in units in the last place of the largest value: measured 6 for positions and angles and 45 for rates (the two-step
-    scheme, 225 steps a unit of time: 62 and 54). Over the run each step adds roundings of a unit or so, of either sign."""
+    """At t = 4.5, in units in the last place of the largest value: measured 6 for positions and angles and 45 for rates (the
+    two-step scheme: 62 and 54). Over the run each step adds roundings of a unit or so, of either sign."""
     for rolling in ("field", "unit", "own"):
         problem = untwisting_chain(16, rolling)
         for method, dt, ulps in (("midpoint", 0.02, 16), ("gauss6", 0.05, 16), ("leapfrog", None, 128)):
