@@ -10,6 +10,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from discs.problem import Problem
 from discs.solution import Solution
 
 NUMBER, COUNT = np.dtype("<f8"), np.dtype("<i8")
+DAMAGE = (OSError, KeyError, TypeError, RuntimeError, ValueError, AttributeError, RecursionError, OverflowError)
 NEEDED = ("time", "s", "checksum", "x", "y", "theta", "omega", "energy")
 
 
@@ -75,10 +77,10 @@ class FrameFile:
             self._places = self._find()
             self.frames = self._places["time"][1][0]
             self.static = {name: self._read(name) for name in self._places if name in PARAMETERS | COORDINATES}
-            self.problem = self._check()
-        except (OSError, KeyError, TypeError, RuntimeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+            self._check()
+        except DAMAGE as error:
             os.close(self._fd)
-            raise ValueError(f"{path} is not a run that was saved, or it is cut off or damaged: {_line(error)}") from None
+            raise self._refusal(error) from None
 
     @classmethod
     def create(cls, path: str | Path, header: Header, shapes: dict[str, tuple[int, ...]]) -> "FrameFile":
@@ -115,6 +117,22 @@ class FrameFile:
     def __exit__(self, *error: object) -> None:
         os.close(self._fd)
 
+    @cached_property
+    def problem(self) -> Problem | None:
+        """The problem, made again from what the file says of it."""
+        told = self.attrs["problem"]
+        try:
+            if told is None:
+                return None
+            if checks.whole("n", told.get("n"), 1) != self._places["s"][1][0]:
+                raise ValueError(f"n = {told['n']} of {self._places['s'][1][0]} discs")
+            return archive.rebuild(told, {name: value for name, value in self.static.items() if name in PARAMETERS})
+        except DAMAGE as error:
+            raise self._refusal(error) from None
+
+    def _refusal(self, error: BaseException) -> ValueError:
+        return ValueError(f"{self.path} is not a run that was saved, or it is cut off or damaged: {_line(error)}")
+
     # Frames
 
     def write(self, f: int, rows: dict[str, Any]) -> None:
@@ -136,8 +154,8 @@ class FrameFile:
                 return f
         return self.frames
 
-    def solution(self) -> Solution:
-        """The frames that are there; ValueError if there are none, or fewer than a complete file has."""
+    def solution(self, problem: Problem | None = None) -> Solution:
+        """The frames that are there; ValueError if there are none, or fewer than a complete file has. A `problem` known is not read."""
         count, missing = self.whole(), {}
         if count < self.frames:
             if self.attrs["complete"]:
@@ -151,7 +169,7 @@ class FrameFile:
             s=self.static["s"],
             stats=self.attrs["stats"] | missing,
             error_estimate=self.attrs["error_estimate"],
-            problem=self.problem,
+            problem=problem or self.problem,
             **rows,
         )
 
@@ -203,8 +221,8 @@ class FrameFile:
                 places[name] = offset, found.shape
         return places
 
-    def _check(self) -> Problem | None:
-        """Check shapes and header; returns the problem."""
+    def _check(self) -> None:
+        """Check shapes and header; sets `attrs` to what they say."""
         for name in NEEDED:
             if name not in self._places:
                 raise ValueError(f"{name} is missing")
@@ -221,13 +239,6 @@ class FrameFile:
         for name, kind in TEXTS.items():
             if not isinstance(self.attrs[name], kind):
                 raise ValueError(f"attribute {name!r} is {type(self.attrs[name]).__name__}")
-        told = self.attrs["problem"]
-        if told is None:
-            return None
-        checks.whole("n", told.get("n"), 1)
-        if told["n"] != self._places["s"][1][0]:
-            raise ValueError(f"n = {told['n']} of {self._places['s'][1][0]} discs")
-        return archive.rebuild(told, {name: value for name, value in self.static.items() if name in PARAMETERS})
 
 
 TEXTS: dict[str, Any] = {"problem": (dict, type(None)), "stats": dict, "error_estimate": (dict, type(None)), "versions": dict}

@@ -146,20 +146,24 @@ class Recording(Rows):
         if not self.complete:
             archive.finish(self.path, stats)
             self.restart.unlink(missing_ok=True)
-        return archive.load(self.path)
+        with FrameFile.open(self.path) as file:
+            return file.solution(self.problem)
 
     def _check(self, file: FrameFile) -> None:
         """Whether the file is of the same run."""
         if file.problem is None:
             raise ValueError(f"{self.path} holds a field; give another path, or delete it")
         there, here = (numbers | arrays for numbers, arrays in map(archive.describe, (file.problem, self.problem)))
-        there, here = ({k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in told.items()} for told in (there, here))
+        there, here = (
+            {k: v.tobytes() if isinstance(v, np.ndarray) else archive.as_text(v) for k, v in told.items()} for told in (there, here)
+        )
         for name in SETTINGS:
-            there[name], here[name] = file.attrs["stats"].get(name), self.about[name]
-        there["frames"], here["frames"] = file.static["time"].tolist(), self.times.tolist()
+            there[name], here[name] = (archive.as_text(told.get(name)) for told in (file.attrs["stats"], self.about))
+        there["frames"], here["frames"] = file.static["time"].tobytes(), self.times.tobytes()
         for name in {**there, **here}:
-            if repr(there.get(name)) != repr(here.get(name)):
-                told = f": {there.get(name)!r} there, {here.get(name)!r} here" if not isinstance(here.get(name), list) else ""
+            one, other = there.get(name), here.get(name)
+            if one != other:
+                told = "" if isinstance(one, bytes) or isinstance(other, bytes) else f": {one} there, {other} here"
                 raise ValueError(f"{self.path} holds another run, whose {name} differs{told}; give another path, or delete it")
 
 
