@@ -58,7 +58,7 @@ class Rod:
     @property
     def inertia(self) -> float:
         """M = alpha + rho R**2, inertia per length against rolling while |r'| = 1."""
-        return self.spin_inertia + self.density * self.radius**2
+        return self.spin_inertia + self.density * (self.radius * self.radius)  # a power would raise where this is inf
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,15 +8,8 @@ from numpy.typing import NDArray
 
 from continuum.rod import Rod, Scene, SteeredRod
 from discs import checks
+from discs.twist import PAPER, twisted
 
-PAPER = {
-    "length": 4.0,
-    "density": 1.0,
-    "spin_inertia": 1.0,
-    "torsion_stiffness": 0.8,
-    "bending_stiffness": 0.7,
-    "radius": 1.0,
-}
 LAW = ("curvature", "stretch_stiffness")
 
 
@@ -34,7 +27,7 @@ def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float =
     """
     rod = _rod(parameters)
     turns = checks.number("twist", twist)
-    initial = partial(_twisted, length=rod.length, amplitude=np.pi * turns)
+    initial = partial(twisted, length=rod.length, amplitude=np.pi * turns)
     return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, name="untwisting rod")
 
 
@@ -95,12 +88,8 @@ def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float =
     return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, closed=True, name="breathing ring")
 
 
-def _twisted(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    return s, 0 * s, -amplitude * np.cos(np.pi * s / length), 0 * s
-
-
 def _steered(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, ...]:
-    return (*_twisted(s, length, amplitude), 0 * s, 0 * s)
+    return (*twisted(s, length, amplitude), 0 * s, 0 * s)
 
 
 def _rolling(s: NDArray, q: float, radius: float, omega: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:

@@ -11,6 +11,7 @@ from continuum.elements import solve_elements
 from continuum.mesh import semidiscretise
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
+from continuum.told import tells_scene
 from discs import Midpoint, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.simulation import frame_times
 
@@ -20,6 +21,7 @@ FINEST = 8193
 MOST_STEPS = 25 * 2**12
 
 
+@tells_scene
 def solve(
     scene: Scene,
     tol: float = 1e-5,

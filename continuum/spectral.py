@@ -25,6 +25,7 @@ theta: in the end no method is faster than that.)
 """
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,9 +201,9 @@ class Course:
         self.tolerance, self._method = tolerance, Gauss8(tolerance=tolerance)
         length = scene.rod.length
         self.s = np.linspace(0, length, NODES) if not scene.closed else length / (NODES - 1) * np.arange(NODES - 1)
-        self._found: dict[tuple[int, int], dict[str, NDArray]] = {}
+        self._found: dict[tuple[int, int], dict[str, Any]] = {}
 
-    def run(self, n: int, steps: int) -> dict[str, NDArray]:
+    def run(self, n: int, steps: int) -> dict[str, Any]:
         """Fields (F, S), energy and slip (F,); SimulationError if the motion cannot go on, or not with these steps."""
         if (n, steps) not in self._found:
             self._bar.set_postfix(functions=n, steps=steps, refresh=False)
@@ -210,7 +211,7 @@ class Course:
             self._found[n, steps] = self._run(n, steps)
         return self._found[n, steps]
 
-    def _run(self, n: int, steps: int) -> dict[str, NDArray]:
+    def _run(self, n: int, steps: int) -> dict[str, Any]:
         rod = SpectralRod(self._scene, n)
         h, z, work = self._scene.duration / steps, rod.start(self._scene), Work()
         bound = 10 * rod.energy(z)

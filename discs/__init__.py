@@ -1,5 +1,6 @@
 """N rolling discs joined by springs: a finite-dimensional nonholonomic mechanical system."""
 
+from discs.archive import load
 from discs.chain import Chain, SteeredChain
 from discs.friction import first_slip, friction_needed
 from discs.integrators import RK4, Gauss4, Gauss6, Gauss8, Integrator, KahanLi6, Leapfrog, McLachlanPerlmutter, Midpoint, Suzuki4
@@ -32,6 +33,7 @@ __all__ = [
     "first_slip",
     "friction_needed",
     "lagrange_dalembert",
+    "load",
     "simulate",
     "suggest_dt",
 ]

@@ -118,6 +118,19 @@ class March:
             notice.cancel()
         _PREPARED.add(key)
 
+    def keep(self) -> dict[str, Any]:
+        """All that the run goes on from, as arrays and numbers by name."""
+        work = {f"work.{name}": value for name, value in vars(self.work).items()}
+        return {"step": self.step} | work | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
+
+    def recall(self, kept: dict[str, Any]) -> None:
+        """Go on from what was kept of the same run."""
+        self.step = int(kept["step"])
+        for name in vars(self.work):
+            setattr(self.work, name, int(kept[f"work.{name}"]))
+        of_memory = {name.removeprefix("memory."): value for name, value in kept.items() if name.startswith("memory.")}
+        self.memory = self.integrator.recall(self.memory, of_memory)
+
     def to(self, step: int) -> Iterator[int]:
         """Go on to a step; yields how many steps were taken at a time."""
         while self.step < step:
@@ -127,7 +140,10 @@ class March:
 
     def frame(self, tau: float) -> Frame:
         """The discs a time 0 <= tau < h after the last step."""
-        frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)
+        try:
+            frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)
+        except ArithmeticError as error:
+            raise self._gave_up(error) from None
         if tau:
             time = self.step * self.h + tau
             moved = Phase(frame.hi, frame.lo, frame.rate)
@@ -151,9 +167,15 @@ class March:
 
     def _plain(self) -> int:
         integrator, system, h = self.integrator, self.system, self.h
-        previous, self.memory = self.memory, integrator.advance(system, self.memory, h, self.work)
+        try:
+            previous, self.memory = self.memory, integrator.advance(system, self.memory, h, self.work)
+        except ArithmeticError as error:
+            raise self._gave_up(error) from None
         self._check(system.lost_heading(previous, self.memory), self.step + 1)
         return 1
+
+    def _gave_up(self, error: ArithmeticError) -> SimulationError:
+        return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)
 
     def _compiled(self, steps: int) -> int:
         self.memory, tally = self.integrator.march(self.kernel, self.memory, self.h, steps, self.bound)

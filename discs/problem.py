@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,6 +73,10 @@ class Problem:
             self._check_slopes(self.chain)
         else:
             self._check_inertia(np.asarray(self.chain.radius) > 0, "radius = 0")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Problems are sent to other processes as what they were made from."""
+        return Problem, (self.chain, self.initial, self.duration)
 
     def _check_slopes(self, chain: Chain) -> None:
         shape = self.system.shape(self._positions())

@@ -2,6 +2,7 @@
 
 import time as clock
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,14 @@ from discs.integrators import Integrator, find
 from discs.integrators.base import Frame
 from discs.marching import March
 from discs.problem import Problem
+from discs.recording import Recording, Rows
 from discs.solution import Solution
 from discs.step import suggest_dt
 from discs.system import RollingDiscs
 from discs.tolerance import to_tolerance
 
 WANTS = ("velocity", "slope", "contact_force")
+MOST_STEPS = 2.0**53
 ENGINES = ("compiled", "plain")
 
 
@@ -31,6 +34,7 @@ def simulate(
     progress: bool = True,
     engine: str = "compiled",
     tol: float | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Solution:
     """Run a problem.
 
@@ -46,6 +50,8 @@ def simulate(
     progress : show a progress bar on anything that takes over a second.
     tol : instead of dt: runs with smaller and smaller steps until x, y, theta (and phi) are within this, relative to the
         largest value of each; see `discs.tolerance`. method="auto" chooses the method too, and takes 1e-3 if it is not given.
+    checkpoint : a file, as "run.nc", that frames are written to as they come, in bounded memory. If it is there, the run that it
+        holds goes on where it was interrupted, to the same bits as one unbroken run; see docs/archives.md.
     engine : "compiled", or "plain" for the same in NumPy and SciPy. Discs with true curvature have only the plain form.
 
     Returns
@@ -54,7 +60,9 @@ def simulate(
 
     Raises
     ------
-    ValueError : for an unknown method or quantity, a step that is not positive, or frames outside the duration.
+    ValueError : for an unknown method or quantity, a step that is not positive, or frames outside the duration; for a checkpoint
+        that holds another run or something else.
+    KeyboardInterrupt : on Ctrl-C; with a checkpoint between two steps, and all so far is kept.
     SimulationError : as soon as the kinetic energy exceeds ten times the total energy of the start, which no exact
         motion does, something is not finite, or (rolling="unit") a disc loses its heading.
     """
@@ -63,6 +71,10 @@ def simulate(
     if method == "auto" or tol is not None:
         if dt is not None:
             raise ValueError("give dt or tol, not both: tol (and method='auto') finds the step")
+        if checkpoint is not None:
+            raise ValueError(
+                "a checkpoint keeps one run, and tol (or method='auto') makes several: give a method and dt, or save the run"
+            )
 
         def run(integrator: Integrator, dt: float, times: NDArray) -> Solution:
             return simulate(problem, integrator, dt, times, want, progress, engine)
@@ -75,39 +87,50 @@ def simulate(
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     times = frame_times(frames, problem.duration)
+    if times[-1] / h > MOST_STEPS:
+        raise ValueError(
+            f"dt = {h:g} makes {times[-1] / h:.1g} steps to t = {times[-1]:g}, more than can be counted: take a larger dt"
+        )
     system = problem.system
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
     before, after = schedule(times, h)
-    rows: dict[str, Any] = {}
+    about = {
+        "method": integrator.name,
+        "order": integrator.order,
+        "settings": repr(integrator),
+        "engine": "compiled" if compiled else "plain",
+        "want": list(want),
+        "dt": h,
+        "dt_suggested": suggested,
+    }
+    record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about)
     started = clock.perf_counter()
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), Progress(integrator.name, before[-1], progress) as shown:
+    with (
+        np.errstate(over="ignore", invalid="ignore", divide="ignore"),
+        Progress(integrator.name, before[-1], progress) as shown,
+        record,
+    ):
+        if record.complete:
+            return record.solution({})
         march = March(problem, integrator, h, compiled, quiet=not progress)
-        for f, last in enumerate(before):
-            for taken in march.to(last):
+        first = record.begin(march)
+        shown.update(march.step)
+        for f in range(first, times.size):
+            for taken in march.to(before[f]):
                 shown.update(taken)
+                record.pause(f, march)
             frame = march.frame(after[f])
             found = march.observe(frame)
             if want:
                 found |= _extras(system, frame, want)
             if offered:
                 found |= integrator.extras(system, march.memory, h)
-            for name, value in found.items():
-                if name not in rows:
-                    rows[name] = np.empty((len(times), *np.shape(value)))
-                rows[name][f] = value
-    stats = {
-        "method": integrator.name,
-        "order": integrator.order,
-        "engine": "compiled" if compiled else "plain",
-        "dt": h,
-        "dt_suggested": suggested,
-        "steps": march.step,
-        **vars(march.work),
-        "seconds": clock.perf_counter() - started,
-    }
-    return Solution(t=times, s=problem.chain.s, stats=stats, **rows)
+            record.write(f, found)
+            record.pause(f + 1, march)
+        seconds = record.seconds + clock.perf_counter() - started
+        return record.solution(about | {"steps": march.step, **vars(march.work), "seconds": seconds})
 
 
 def _extras(system: RollingDiscs, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discs.problem import Problem
+
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.axes import Axes
 
     from discs.view import View
@@ -37,6 +40,7 @@ class Solution:
         per time squared; want "contact_force".
     tension : (F, n_links), the multiplier p in the links of a free rod, force; of `continuum.free_rod`.
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
+    problem : what was computed, for discs; for a field of "richardson" that on the finest mesh, otherwise None.
     error_estimate : for a field, {"x", "y", "theta", "omega"} -> estimated largest error over nodes and frames.
     """
 
@@ -59,6 +63,7 @@ class Solution:
     tension: NDArray | None = None
     modified_energy: NDArray | None = None
     error_estimate: dict[str, float] | None = None
+    problem: Problem | None = None
 
     def __repr__(self) -> str:
         frames, n = self.x.shape
@@ -91,3 +96,15 @@ class Solution:
         from discs.view import view
 
         return view(self, path, beside, **style)
+
+    def save(self, path: str | Path) -> None:
+        """Write the run to a NetCDF-4 file, read again by `discs.load`; see docs/archives.md."""
+        from discs import archive
+
+        archive.save(self, path)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The run as a dataset with dimensions (time, disc), units and names."""
+        from discs import archive
+
+        return archive.to_xarray(self)

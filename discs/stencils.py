@@ -68,11 +68,11 @@ def slope_matrix(n: int, k: float, ends: str) -> sp.csr_array:
     if ends == "ring":
         mean = sp.diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, n - 1], shape=(n, n))
         return sp.csr_array(mean / (2 * k))
-    mean = sp.lil_array(sp.diags_array([1.0, 1.0], offsets=[-1, 0], shape=(n, n - 1)))
-    end = [4.0, -3.0, 1.0] if ends == "consistent" else [3.0, -1.0]
-    mean[0, : len(end)] = end
-    mean[n - 1, n - 1 - len(end) :] = end[::-1]
-    return sp.csr_array(mean / (2 * k))
+    mean = sp.diags_array([1.0, 1.0], offsets=[-1, 0], shape=(n, n - 1))
+    more = [3.0, -3.0, 1.0] if ends == "consistent" else [2.0, -1.0]  # at an end, beside the one that is there
+    m = len(more)
+    places = np.repeat([0, n - 1], m), np.concatenate([np.arange(m), n - 2 - np.arange(m)])
+    return sp.csr_array((mean + sp.coo_array((more + more, places), shape=(n, n - 1))) / (2 * k))
 
 
 def bend_matrix(n: int, k: float, ends: str) -> sp.csr_array:

@@ -98,6 +98,14 @@ class Integrator(ABC):
     def kinetic(self, system: RollingDiscs, memory: Any, h: float) -> float:
         """Kinetic energy at the last step; for a two-step method, half a step later."""
 
+    @abstractmethod
+    def keep(self, memory: Any) -> dict[str, Any]:
+        """The memory as arrays and numbers by name, all that `recall` needs to go on bit for bit."""
+
+    @abstractmethod
+    def recall(self, memory: Any, kept: dict[str, Any]) -> Any:
+        """The memory that was kept; `memory` is that of `begin`, of the same run."""
+
     def extras(self, system: RollingDiscs, memory: Any, h: float) -> dict[str, float]:
         """The quantities in `offers`, at the last step."""
         return {}
@@ -142,6 +150,14 @@ class OneStep(Integrator):
         rate = np.empty_like(z.hi)
         methods.rates(chain, z.hi, z.lo, np.atleast_2d(z.pi), rate)
         return Frame(z.hi, z.lo, rate)
+
+    @final
+    def keep(self, memory: Phase) -> dict[str, Any]:
+        return memory._asdict()
+
+    @final
+    def recall(self, memory: Phase, kept: dict[str, Any]) -> Phase:
+        return Phase(**kept)
 
     @final
     def kinetic(self, system: RollingDiscs, memory: Phase, h: float) -> float:

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from discs import checks
+from discs.integrators import solvers
 from discs.integrators.base import Frame, Integrator, Tally, Work
 from discs.system import Phase, RollingDiscs
 
@@ -98,6 +99,9 @@ class SolveIvp(Integrator, ABC):
         method = getattr(scipy.integrate, self.name)
         y = f.join(z.hi + z.lo, z.pi)
         solver = method(f, 0.0, y, np.inf, rtol=self.rtol, atol=self.atol, max_step=h, **self.options(f))
+        if hasattr(solver, "lu"):
+            make = solver.lu
+            solver.lu = lambda matrix: solvers.Factors(matrix, make)
         return Course(f, solver, 0.0, z)
 
     def advance(self, system: RollingDiscs, memory: "Course", h: float, work: Work) -> "Course":
@@ -112,6 +116,15 @@ class SolveIvp(Integrator, ABC):
 
     def kinetic(self, system: RollingDiscs, memory: "Course", h: float) -> float:
         return 0.5 * float(np.vdot(memory.pi, memory.pi))
+
+    def keep(self, memory: "Course") -> dict[str, Any]:
+        course = {name: getattr(memory, name) for name in ("time", "hi", "lo", "pi")}
+        return course | {f"solver.{name}": value for name, value in solvers.keep(memory.solver).items()}
+
+    def recall(self, memory: "Course", kept: dict[str, Any]) -> "Course":
+        of_solver = {name.removeprefix("solver."): value for name, value in kept.items() if name.startswith("solver.")}
+        solvers.recall(memory.solver, of_solver)
+        return Course(memory.f, memory.solver, float(kept["time"]), Phase(kept["hi"], kept["lo"], kept["pi"]))
 
 
 class Course:

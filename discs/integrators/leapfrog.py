@@ -74,6 +74,12 @@ class Leapfrog(Integrator):
     def kinetic(self, system: RollingDiscs, memory: TwoStep, h: float) -> float:
         return system.kinetic(memory.next / h)
 
+    def keep(self, memory: TwoStep) -> dict[str, Any]:
+        return memory._asdict()
+
+    def recall(self, memory: TwoStep, kept: dict[str, Any]) -> TwoStep:
+        return TwoStep(**kept)
+
     def extras(self, system: RollingDiscs, memory: TwoStep, h: float) -> dict[str, float]:
         shape = system.shape(memory.hi, memory.lo)
         polarised = system.polarised(shape, system.moved(shape, memory.next))

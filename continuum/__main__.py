@@ -1,0 +1,76 @@
+"""Command line of `continuum`."""
+
+import argparse
+import sys
+
+from continuum.files import read_scene
+from continuum.mesh import semidiscretise
+from continuum.rod import Scene
+from continuum.scenes import untwisting_rod
+from continuum.solver import solve
+from discs import command_line
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options."""
+    p = argparse.ArgumentParser(
+        prog="python -m continuum", description="The nonholonomic Cosserat rod: its fields, and its discs. Any consistent units."
+    )
+    commands = p.add_subparsers(metavar="COMMAND", title="commands", required=True, dest="command")
+    field = commands.add_parser(
+        "solve", help="the fields of a scene to a tolerance", description="The fields of a scene, with an error estimate."
+    )
+    _add_scene(field)
+    field.add_argument(
+        "--tol", metavar="TOL", type=float, default=1e-5, help="largest error of x, y (length), theta, phi (rad) (default: 1e-5)"
+    )
+    field.add_argument(
+        "--method", metavar="NAME", help="as continuum.solve has them, leapfrog the paper's (default: what fits the scene)"
+    )
+    field.add_argument("--n", metavar="N", type=int, help="points of leapfrog (default: 32)")
+    field.add_argument("--dt", metavar="DT", type=float, help="step of leapfrog, time (default: k^2/8)")
+    field.add_argument("--frames", metavar="F", type=int, default=2, help="frames, equally spaced over the time (default: 2)")
+    command_line.add_saving(field)
+    field.set_defaults(run=run_solve)
+    discs = commands.add_parser(
+        "discs", help="a scene's rod as N discs", description="A scene's rod lumped into N discs, run as by python -m discs run."
+    )
+    _add_scene(discs)
+    command_line.add_run_options(discs)
+    discs.set_defaults(run=run_discs)
+    command_line.add_file_commands(commands)
+    return p
+
+
+def _add_scene(p: argparse.ArgumentParser) -> None:
+    p.add_argument("--scene", metavar="FILE.toml", help="the scene (default: the paper's untwisting rod)")
+
+
+def _scene(options: argparse.Namespace) -> Scene:
+    return read_scene(options.scene) if options.scene else untwisting_rod()
+
+
+def run_solve(options: argparse.Namespace) -> None:
+    """The command `solve`."""
+    scene = _scene(options)
+    command_line.clear_way(options, whole=True)
+    field = solve(scene, options.tol, options.method, options.n, options.dt, options.frames, not options.quiet)
+    if options.save:
+        field.save(options.save)
+    print(command_line.summary(field))
+    if options.save:
+        print(f"written to {options.save}")
+
+
+def run_discs(options: argparse.Namespace) -> None:
+    """The command `discs`."""
+    command_line.run_discs(semidiscretise(_scene(options), options.n, options.ends), options)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
+    return command_line.main(parser(), arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,60 @@
+"""Command line of `discs`."""
+
+import argparse
+import sys
+
+from discs import command_line
+from discs.twist import DURATION, PAPER, STEERED, TURNS, untwisting_chain
+
+UNITS = {
+    "length": "length of the rod, length",
+    "density": "rho, mass per length",
+    "spin_inertia": "alpha, inertia about the axle per length, mass length",
+    "torsion_stiffness": "beta, mass length^3/time^2",
+    "bending_stiffness": "K, mass length^3/time^2",
+    "radius": "R of the discs, length",
+    "heading_inertia": "J, inertia about the vertical per length, mass length; --rolling own",
+    "stretch_stiffness": "A, mass length/time^2; --rolling own",
+    "shear_stiffness": "G, mass length/time^2; --rolling own",
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options."""
+    p = argparse.ArgumentParser(
+        prog="python -m discs",
+        description="N rolling discs joined by springs. Any consistent units. Scenes from files: python -m continuum discs.",
+    )
+    commands = p.add_subparsers(metavar="COMMAND", title="commands", required=True, dest="command")
+    run = commands.add_parser(
+        "run",
+        help="run the paper's twist",
+        description="A straight rod of discs, twisted by half a turn, lets go. With --save every frame is written as it comes; "
+        "after Ctrl-C or a crash the same command goes on where it was.",
+    )
+    run.add_argument("--t", metavar="T", type=float, default=DURATION, help=f"duration, time (default: {DURATION})")
+    run.add_argument("--rolling", choices=("field", "unit", "own"), default="field", help="law; own: own headings (default: field)")
+    run.add_argument("--twist", metavar="TURNS", type=float, default=TURNS, help=f"turns between the ends (default: {TURNS})")
+    command_line.add_run_options(run)
+    rod = run.add_argument_group("the rod")
+    for name, value in (PAPER | STEERED).items():
+        rod.add_argument(f"--{name.replace('_', '-')}", metavar="X", type=float, help=f"{UNITS[name]} (default: {value})")
+    run.set_defaults(run=run_twist)
+    command_line.add_file_commands(commands)
+    return p
+
+
+def run_twist(options: argparse.Namespace) -> None:
+    """The command `run`."""
+    given = {name: value for name in PAPER | STEERED if (value := getattr(options, name)) is not None}
+    problem = untwisting_chain(options.n, options.rolling, options.ends, options.t, options.twist, **given)
+    command_line.run_discs(problem, options)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
+    return command_line.main(parser(), arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

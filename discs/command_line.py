@@ -1,0 +1,170 @@
+"""What the command lines of the packages share: options of a run, what is said about a file, exit codes."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from discs.archive import QUANTITIES, describe, load
+from discs.framefile import FrameFile, check_writable, fresh
+from discs.integrators import METHODS
+from discs.marching import SimulationError
+from discs.problem import Problem
+from discs.simulation import ENGINES, WANTS, simulate
+from discs.solution import Solution
+from discs.stencils import ENDS
+
+OFFERS = sorted({name for method in METHODS.values() for name in method.offers})
+
+
+def add_run_options(p: argparse.ArgumentParser) -> None:
+    """Options of `run_discs`."""
+    p.add_argument("--n", metavar="N", type=int, default=64, help="number of discs (default: 64)")
+    p.add_argument("--ends", choices=[e for e in ENDS if e != "ring"], default="springs", help="free ends (default: springs)")
+    p.add_argument("--method", choices=("auto", *METHODS), metavar="NAME", help=f"auto, {', '.join(METHODS)} (default: midpoint)")
+    p.add_argument("--dt", metavar="DT", type=float, help="time step, time (default: suggested from the chain, and said)")
+    p.add_argument("--tol", metavar="TOL", type=float, help="instead of --dt: largest error, relative (default: none)")
+    p.add_argument("--frames", metavar="F", type=int, default=101, help="frames, equally spaced over the time (default: 101)")
+    p.add_argument(
+        "--want", metavar="NAME", nargs="+", default=[], help=f"record also {', '.join((*WANTS, *OFFERS))} (default: none)"
+    )
+    p.add_argument("--engine", choices=ENGINES, default="compiled", help="kernels or NumPy and SciPy (default: compiled)")
+    add_saving(p)
+
+
+def add_saving(p: argparse.ArgumentParser) -> None:
+    """Options of what is written."""
+    p.add_argument("--save", metavar="FILE", help="NetCDF file for the run (default: not saved)")
+    p.add_argument("--overwrite", action="store_true", help="replace FILE if there is another run in it (default: refuse)")
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
+
+
+def add_file_commands(commands: Any) -> None:
+    """The commands that read a file."""
+    p = commands.add_parser("info", help="say what is in a file", description="Say what is in a file.")
+    p.add_argument("file", metavar="FILE", help="a saved run")
+    p.set_defaults(run=lambda options: print(about(options.file)))
+    for name, what, out in (
+        ("plot", "pictures of a run", "run.png"),
+        ("animate", "a movie of the discs as they roll", "run.mp4"),
+        ("view", "a page to turn and play the run in three dimensions", "run.html"),
+    ):
+        p = commands.add_parser(name, help=what, description=what[0].upper() + what[1:] + ".")
+        p.add_argument("file", metavar="FILE", help="a saved run")
+        p.add_argument("--out", metavar="FILE", default=out, help=f"file to write (default: {out})")
+        p.set_defaults(run=draw)
+
+
+def run_discs(problem: Problem, options: argparse.Namespace) -> None:
+    """Run a problem as the options say, and say what came out."""
+    settled: dict[str, Any] = {
+        "frames": options.frames,
+        "want": options.want,
+        "engine": options.engine,
+        "progress": not options.quiet,
+    }
+    method = options.method or "midpoint"
+    several = method == "auto" or options.tol is not None
+    clear_way(options, whole=several)
+    if several:
+        run = simulate(problem, method, options.dt, tol=options.tol, **settled)
+        if options.save:
+            run.save(options.save)
+    else:
+        run = simulate(problem, method, options.dt, checkpoint=options.save, **settled)
+    print(summary(run))
+    if options.save:
+        print(f"written to {options.save}")
+
+
+def clear_way(options: argparse.Namespace, whole: bool) -> None:
+    """See that a run can be saved before it is computed; one that is not saved `whole` at the end may go on from its file."""
+    if options.overwrite and not options.save:
+        raise ValueError("--overwrite goes with --save FILE")
+    if not options.save:
+        return
+    path = Path(options.save)
+    check_writable(path)
+    if path.exists() and options.overwrite:
+        with FrameFile.open(path):  # nothing but a run is ever deleted
+            pass
+        path.unlink()
+    elif path.exists() and whole:
+        raise ValueError(f"{path} exists; give --overwrite to replace it")
+
+
+def summary(run: Solution) -> str:
+    """What came out, in a few lines."""
+    stats, drift = run.stats, np.abs(run.energy - run.energy[0]).max()
+    what = f"field of the {stats['scene']['name']} on {run.s.size} nodes" if is_field(run) else f"{run.s.size} discs"
+    lines = [f"{what}, {run.t.size} frames, t = {run.t[0]:g} to {run.t[-1]:g}"]
+    if stats.get("frames_missing"):
+        lines.append(f"unfinished: {stats['frames_missing']} frames are not there yet")
+    done = [f"dt = {stats['dt']:g}" + (" (suggested)" if stats.get("dt_suggested") else "")] if stats.get("dt") else []
+    done += [f"{stats['steps']} steps"] if "steps" in stats else []
+    done += [f"{stats['seconds']:.3g} s"] if "seconds" in stats else []
+    lines.append(f"method {stats.get('method')}" + (f": {', '.join(done)}" if done else ""))
+    lines.append(f"energy {run.energy[0]:.9g}, changed by {drift:.1e} at most")
+    if run.rolling_residual is not None:
+        lines.append(f"largest slip {run.rolling_residual.max():.1e}")
+    if run.error_estimate:
+        errors = ", ".join(f"{name} {error:.1e}" for name, error in run.error_estimate.items())
+        lines.append(f"estimated error: {errors}")
+    return "\n".join(lines)
+
+
+def is_field(run: Solution) -> bool:
+    """Whether a run is a field, which says its scene."""
+    return isinstance(run.stats.get("scene"), dict)
+
+
+def about(path: str | Path) -> str:
+    """What is in a file: the run, its parameters, what it was made with."""
+    run, told = load(path), []
+    if is_field(run):
+        told = [f"{name} = {value}" for name, value in run.stats["scene"].items()]
+    elif run.problem is not None:
+        numbers, arrays = describe(run.problem)
+        told = [f"{name} = {value}" for name, value in numbers.items() if value is not None]
+        told += [f"{name}: {value.size} numbers, {value.min():.6g} to {value.max():.6g}" for name, value in arrays.items()]
+    with FrameFile.open(path) as file:
+        made = ", ".join(f"{name} {value}" for name, value in file.attrs["versions"].items())
+    recorded = ", ".join(name for name in QUANTITIES if getattr(run, name) is not None)
+    return "\n".join([summary(run), f"recorded: {recorded}", *told, f"made with {made}"])
+
+
+def draw(options: argparse.Namespace) -> None:
+    """Write the picture, movie or page that `options.command` names."""
+    run, out = load(options.file), Path(options.out)
+    check_writable(out)
+    make = getattr(run, options.command, None)
+    if make is None:
+        raise ValueError(f"this version has no Solution.{options.command}")
+    if options.command == "plot":
+        with fresh(out) as temporary:
+            make()[0].figure.savefig(temporary, format=out.suffix.removeprefix(".") or "png")
+    else:
+        make(out)
+    print(f"written to {out}")
+
+
+def main(parser: argparse.ArgumentParser, arguments: list[str] | None) -> int:
+    """Run a command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
+    options = parser.parse_args(arguments)
+    try:
+        options.run(options)
+    except (ValueError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except MemoryError as error:
+        print(f"error: too large for this machine's memory: {error}", file=sys.stderr)
+        return 2
+    except SimulationError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt as stop:
+        print(str(stop) or "interrupted; what is on disc is whole", file=sys.stderr)
+        return 130
+    return 0

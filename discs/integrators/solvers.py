@@ -1,0 +1,80 @@
+"""What a solver of SciPy remembers between steps, as arrays and numbers, and back.
+
+SciPy offers no such thing. Its solvers keep what they know in attributes: numbers, arrays, a sparse Jacobian, factors of a matrix
+(which are made again from the matrix, to the same bits) and the last step's interpolant (which is made again from the rest).
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.integrate import LSODA, OdeSolver, Radau
+
+PARTS = ("data", "indices", "indptr")
+
+
+class Factors:
+    """Factors of a sparse matrix that know the matrix they were made from.
+
+    Parameters
+    ----------
+    matrix : what is factored.
+    make : matrix -> factors, as SciPy's solvers make them.
+    """
+
+    def __init__(self, matrix: sp.csc_matrix, make: Callable[[sp.csc_matrix], Any]) -> None:
+        self.matrix, self._factors = matrix, make(matrix)
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the matrix."""
+        return self._factors.solve(b)
+
+
+def keep(solver: OdeSolver) -> dict[str, Any]:
+    """What a solver remembers; nothing of an LSODA whose memory is hidden in Fortran (SciPy before 1.17) but its time."""
+    if isinstance(solver, LSODA):
+        ode = solver._lsoda_solver
+        inner = ode._integrator
+        if not hasattr(inner, "state_doubles"):
+            return {"replay": solver.t}
+        arrays = {name: getattr(inner, name).copy() for name in ("rwork", "iwork", "state_doubles", "state_ints")}
+        return _numbers(vars(solver)) | arrays | {"inner_y": ode._y.copy(), "inner_t": ode.t, "istate": inner.call_args[3]}
+    kept = _numbers(vars(solver))
+    for name, value in vars(solver).items():
+        matrix = value.matrix if isinstance(value, Factors) else value
+        if sp.issparse(matrix) and name != "I":
+            kept |= {f"{name}.{part}": getattr(matrix, part).copy() for part in PARTS}
+    return kept
+
+
+def recall(solver: OdeSolver, kept: dict[str, Any]) -> None:
+    """Make a new solver of the same problem remember what another one did."""
+    if "replay" in kept:  # its steps do not depend on what they were asked for: take them again
+        while solver.t < kept["replay"]:
+            solver.step()
+        return
+    kept = dict(kept)
+    if isinstance(solver, LSODA):
+        ode = solver._lsoda_solver
+        inner = ode._integrator
+        ode._y, ode.t, inner.call_args[3] = kept.pop("inner_y"), float(kept.pop("inner_t")), int(kept.pop("istate"))
+        for name in ("rwork", "iwork", "state_doubles", "state_ints"):
+            getattr(inner, name)[...] = kept.pop(name)
+    for name in {name.split(".")[0] for name in kept if "." in name}:
+        matrix = sp.csc_matrix(tuple(kept.pop(f"{name}.{part}") for part in PARTS), shape=(solver.n, solver.n))
+        setattr(solver, name, solver.lu(matrix) if name.startswith("LU") else matrix)
+    for name, value in kept.items():  # last, so that counts of work are right
+        now = getattr(solver, name)
+        if isinstance(now, np.ndarray) and now.shape == np.shape(value):
+            now[...] = value  # in place: some arrays are views of others
+        else:
+            setattr(solver, name, value if np.ndim(value) else value.item())
+    if isinstance(solver, Radau) and solver.t_old is not None:
+        solver.sol = solver._compute_dense_output()
+
+
+def _numbers(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Arrays and numbers among attributes."""
+    wanted = (bool, int, float, np.ndarray, np.generic)
+    return {name: np.array(value, copy=True) for name, value in attributes.items() if isinstance(value, wanted)}

@@ -1,0 +1,56 @@
+"""The paper's rod and its twist, as discs: what a run starts from when nothing else is given."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs import checks
+from discs.chain import Chain, SteeredChain
+from discs.problem import Problem, State
+
+PAPER = {
+    "length": 4.0,
+    "density": 1.0,
+    "spin_inertia": 1.0,
+    "torsion_stiffness": 0.8,
+    "bending_stiffness": 0.7,
+    "radius": 1.0,
+}
+STEERED = {"heading_inertia": 0.25, "stretch_stiffness": 10.0, "shear_stiffness": 10.0}
+DURATION = 4.5
+TURNS = 0.5
+
+
+def twisted(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """x, y, theta, omega of a straight rod at rest, theta = -amplitude cos(pi s/length)."""
+    return s, 0 * s, -amplitude * np.cos(np.pi * s / length), 0 * s
+
+
+def untwisting_chain(
+    n: int, rolling: str = "field", ends: str = "springs", duration: float = DURATION, twist: float = TURNS, **parameters: Any
+) -> Problem:
+    """n discs in a straight line at rest, twisted by theta = -pi twist cos(pi s/length), let go: the paper's scene.
+
+    Parameters
+    ----------
+    n : number of discs.
+    rolling : "field", "unit", or "own" for discs with a heading of their own.
+    ends : of a `Chain`; "springs" for own headings.
+    duration : time.
+    twist : turns between the two ends.
+    parameters : of the chain; the paper's by default, and for own headings J = 0.25, A = G = 10.
+
+    Raises
+    ------
+    ValueError : for an unknown parameter or one out of its range.
+    """
+    own = checks.choice("rolling", rolling, ("field", "unit", "own")) == "own"
+    standard = PAPER | STEERED if own else PAPER
+    for name in parameters:
+        checks.choice("parameter of the chain" + (" (own headings)" if own else ""), name, standard)
+    given: dict[str, Any] = {"n": n, "ends": ends} | standard | parameters
+    checks.choice("ends (a straight rod)", ends, ("springs",) if own else ("springs", "consistent", "paper"))
+    chain: Chain | SteeredChain = SteeredChain(**given) if own else Chain(**given, rolling=rolling)
+    x, y, theta, omega = twisted(chain.s, chain.length, np.pi * checks.number("twist", twist))
+    return Problem(chain, State(x, y, theta, omega, phi=0 * x if own else None), duration)

@@ -1,0 +1,241 @@
+"""Runs as files: bit for bit, whole or refused, readable by others."""
+
+import json
+import subprocess
+import sys
+from dataclasses import fields, replace
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+from continuum import solve, steered_rod, untwisting_rod
+from discs import Problem, Solution, archive, framefile, load, simulate
+from tests.conftest import ALL, Model, models, uneven
+
+
+def same(a: Solution, b: Solution) -> None:
+    """Every array and word of two runs alike, to the bit."""
+    for field in fields(Solution):
+        one, other = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(one, np.ndarray):
+            assert one.dtype == other.dtype
+            assert one.shape == other.shape, field.name
+            assert one.tobytes() == other.tobytes(), field.name
+        elif field.name == "problem":
+            assert repr_of(one) == repr_of(other)
+        else:
+            assert json.loads(archive.as_text(one)) == other, field.name
+
+
+def repr_of(problem: Problem | None) -> str:
+    with np.printoptions(floatmode="unique", threshold=sys.maxsize):
+        return "" if problem is None else repr((problem.chain, problem.initial, problem.duration))
+
+
+@pytest.fixture(scope="module")
+def run():
+    every = ("velocity", "slope", "contact_force", "modified_energy")
+    return simulate(uneven(7, Model("springs", "field")), "leapfrog", 0.004, 6, every, progress=False)
+
+
+@pytest.fixture
+def saved(run, tmp_path):
+    run.save(tmp_path / "run.nc")
+    return tmp_path / "run.nc"
+
+
+@models(ALL)
+def test_round_trip(model, tmp_path):
+    engine = "plain" if model.law == "true" else "compiled"
+    problem = uneven(6, model, equal=model.ends == "consistent")
+    run = simulate(problem, dt=0.05, frames=4, want=("velocity", "contact_force"), progress=False, engine=engine)
+    run.save(tmp_path / "run.nc")
+    same(run, load(tmp_path / "run.nc"))
+    again = simulate(load(tmp_path / "run.nc").problem, dt=0.05, frames=4, progress=False, engine=engine)
+    assert again.x.tobytes() == run.x.tobytes()  # what is in the file is enough to repeat the run
+
+
+@pytest.mark.parametrize(
+    "scene", [untwisting_rod(duration=0.3), steered_rod(duration=0.3, radius=0.7)], ids=["richardson", "elements"]
+)
+def test_fields_too(scene, tmp_path):
+    field = solve(scene, 1e-3, frames=3, progress=False)
+    field.save(tmp_path / "field.nc")
+    found = load(tmp_path / "field.nc")
+    same(field, found)
+    assert found.error_estimate == field.error_estimate
+    assert found.stats["scene"]["radius"] == scene.rod.radius
+
+
+def test_every_quantity_has_unit_and_name(run):
+    arrays = {f.name for f in fields(Solution)} - {"t", "s", "stats", "error_estimate", "problem"}
+    assert arrays == set(archive.QUANTITIES)
+    dataset = run.to_xarray()
+    assert all(variable.attrs["long_name"] for variable in dataset.variables.values())
+    assert dataset.x.dims == ("time", "disc")
+    assert dataset.x.units == "length"
+    assert dataset.contact_force.dims == ("time", "axis", "disc")
+    assert dataset.bending_stiffness.dims == ("bend",)
+
+
+def test_opens_in_plain_xarray(run, saved):
+    with xarray.open_dataset(saved, engine="h5netcdf") as dataset:
+        xarray.testing.assert_identical(dataset.load(), run.to_xarray())
+    told = json.loads(dataset.attrs["problem"])
+    assert (told["chain"], told["n"], told["length"], told["rolling"]) == ("Chain", 7, 3.1, "field")
+    assert json.loads(dataset.attrs["stats"])["settings"] == "Leapfrog()"
+    assert dataset.attrs["method"] == "leapfrog"
+    assert json.loads(dataset.attrs["versions"])["numpy"] == np.__version__
+    assert json.loads(dataset.attrs["seeds"]) == {}
+
+
+def test_a_dataset_that_xarray_wrote_is_a_run(run, tmp_path):
+    run.to_xarray().to_netcdf(tmp_path / "by-xarray.nc", engine="h5netcdf")
+    same(run, load(tmp_path / "by-xarray.nc"))
+
+
+def test_large_files_are_mapped(run, saved, monkeypatch):
+    monkeypatch.setattr(archive, "MAPPED", 0)
+    mapped = load(saved)
+    assert isinstance(mapped.x, np.memmap)
+    same(run, mapped)
+    mapped.x[0, 0] = 7.0  # stays in memory
+    same(run, load(saved))
+
+
+def test_a_crash_leaves_the_old_file(run, saved, monkeypatch):
+    before = saved.read_bytes()
+
+    def fails(self, f, rows):
+        raise OSError("disc full")
+
+    monkeypatch.setattr(framefile.FrameFile, "write", fails)
+    with pytest.raises(OSError, match="disc full"):
+        replace(run, x=run.x + 1).save(saved)
+    assert saved.read_bytes() == before
+    assert [p.name for p in saved.parent.iterdir()] == ["run.nc"]
+
+
+def test_cut_off_files_are_refused(saved):
+    whole = saved.read_bytes()
+    for size in (0, 1, 7, 8, 100, 2000, len(whole) // 2, len(whole) - 9, len(whole) - 1):
+        saved.write_bytes(whole[:size])
+        with pytest.raises(ValueError, match="cut off or damaged"):
+            load(saved)
+
+
+def test_a_changed_byte_is_never_a_changed_run(run, saved):
+    """Each byte that is changed is noticed or does not matter to the run."""
+    whole = saved.read_bytes()
+    noticed = 0
+    for place in np.random.default_rng(3).integers(0, len(whole), 200):
+        saved.write_bytes(whole[:place] + bytes([whole[place] ^ 0x41]) + whole[place + 1 :])
+        try:
+            found = load(saved)
+        except ValueError:
+            noticed += 1
+        else:
+            for name in ("t", "s", *archive.QUANTITIES):
+                assert (getattr(found, name) is None) or getattr(found, name).tobytes() == getattr(run, name).tobytes(), (
+                    place,
+                    name,
+                )
+            assert repr_of(found.problem) == repr_of(run.problem)
+    assert noticed > 20
+
+
+def change(path, do):
+    with h5py.File(path, "r+") as file:
+        do(file)
+
+
+def without(name):
+    return lambda file: file.pop(name)
+
+
+def attribute(name, value):
+    return lambda file: file.attrs.update({name: value})
+
+
+def elsewhere(file):
+    del file["x"]
+    file["x"] = h5py.ExternalLink("other.nc", "/x")
+
+
+def packed(file):
+    x = file.pop("x")[...]
+    file.create_dataset("x", data=x, chunks=True, compression="gzip")
+
+
+@pytest.mark.parametrize(
+    ("do", "message"),
+    [
+        (without("theta"), "theta is missing"),
+        (attribute("format", "another"), "'format' is not"),
+        (attribute("stats", "{"), "damaged"),
+        (attribute("stats", "[1]"), "attribute 'stats' is list"),
+        (attribute("problem", '{"chain": "Chain", "n": 1e99}'), "not what was written"),
+        (attribute("stats", 3.5), "an attribute is"),
+        (elsewhere, "x is not a variable of this file"),
+        (packed, "x is not stored as float64 in one piece"),
+    ],
+)
+def test_files_that_are_not_as_they_should_be(do, message, saved):
+    change(saved, do)
+    with pytest.raises(ValueError, match=message):
+        load(saved)
+
+
+def test_a_frame_that_was_changed_is_refused(saved):
+    change(saved, lambda file: file["y"].write_direct(np.array([1.0]), dest_sel=np.s_[3, 2:3]))
+    with pytest.raises(ValueError, match="damaged: frame 3 is not what was written"):
+        load(saved)
+
+
+def test_foreign_files_are_refused(tmp_path):
+    (tmp_path / "text.nc").write_text("no run")
+    xarray.Dataset({"x": ("time", [1.0])}).to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
+    for name in ("text.nc", "foreign.nc"):
+        with pytest.raises(ValueError, match=f"{name} is not a run that was saved"):
+            load(tmp_path / name)
+    with pytest.raises(ValueError, match=r"missing\.nc cannot be read: No such file"):
+        load(tmp_path / "missing.nc")
+    with pytest.raises(ValueError, match=r"is not a run|cannot be read"):
+        load(tmp_path)
+
+
+def test_where_nothing_can_be_written(run, tmp_path):
+    with pytest.raises(ValueError, match="cannot be written: No such file"):
+        run.save(tmp_path / "missing" / "run.nc")
+    with pytest.raises(ValueError, match="cannot be written: it is a folder"):
+        run.save(tmp_path)
+
+
+def test_import_is_lazy():
+    code = "import discs, sys; assert not {'xarray', 'h5netcdf', 'h5py'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+MEMORY = """
+import resource, sys
+from discs import simulate
+from discs.twist import untwisting_chain
+problem = untwisting_chain(int(sys.argv[1]), duration=1e-6)
+run = simulate(problem, dt=1e-6, frames=int(sys.argv[2]), checkpoint=sys.argv[3], engine=sys.argv[4], progress=False)
+assert abs(run.x[-1, 0]) < 1e-3
+print(run.x.nbytes, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+def test_memory_does_not_grow_with_frames(tmp_path):
+    """A file of 65 MB through a process that holds far less; a million discs and 50 frames by hand, see docs/archives.md."""
+    used = []
+    for frames in (2, 102):
+        path = tmp_path / f"{frames}.nc"
+        command = [sys.executable, "-c", MEMORY, "20000", str(frames), str(path), "plain"]
+        used.append(int(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()[1]))
+        size = path.stat().st_size
+    assert size > 5e7
+    assert used[1] - used[0] < 0.3 * size

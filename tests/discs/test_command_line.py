@@ -1,0 +1,167 @@
+"""`python -m discs` as a user meets it."""
+
+import argparse
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from continuum.__main__ import parser as parser_of_continuum
+from discs import Solution, load, simulate
+from discs.__main__ import main, parser
+from discs.twist import untwisting_chain
+from tests.discs.test_archive import same
+
+
+def test_run_saves_what_simulate_gives(tmp_path, capsys):
+    path = tmp_path / "run.nc"
+    options = ["--n", "9", "--t", "0.5", "--rolling", "unit", "--ends", "consistent", "--radius", "0.7", "--twist", "0.3"]
+    options += ["--dt", "0.05", "--frames", "3", "--want", "slope", "contact_force", "--save", str(path), "--quiet"]
+    assert main(["run", *options]) == 0
+    problem = untwisting_chain(9, "unit", "consistent", 0.5, 0.3, radius=0.7)
+    run, expected = load(path), simulate(problem, dt=0.05, frames=3, want=("slope", "contact_force"), progress=False)
+    assert run.contact_force.tobytes() == expected.contact_force.tobytes()
+    printed = capsys.readouterr().out
+    assert printed.startswith("9 discs, 3 frames, t = 0 to 0.5\nmethod midpoint: dt = 0.05, 10 steps")
+    assert printed.endswith(f"written to {path}\n")
+    assert main(["run", *options]) == 0  # finished: nothing to do
+    same(load(path), run)
+    capsys.readouterr()
+    assert main(["info", str(path)]) == 0
+    told = capsys.readouterr().out
+    for word in ("radius = 0.7", "rolling = unit", "recorded: x, y, theta, omega, slope_x", "initial_theta: 9 numbers", "numpy"):
+        assert word in told
+
+
+def test_tolerance_own_headings_and_overwrite(tmp_path, capsys):
+    path = tmp_path / "run.nc"
+    options = [
+        "run",
+        "--n",
+        "5",
+        "--t",
+        "0.2",
+        "--rolling",
+        "own",
+        "--tol",
+        "1e-3",
+        "--frames",
+        "2",
+        "--save",
+        str(path),
+        "--quiet",
+    ]
+    assert main(options) == 0
+    assert "estimated error: x" in capsys.readouterr().out
+    assert main(options) == 2
+    assert "exists; give --overwrite to replace it" in capsys.readouterr().err
+    assert main([*options, "--shear-stiffness", "7.5", "--overwrite"]) == 0
+    assert load(path).problem.chain.shear_stiffness[0] == 7.5
+    (tmp_path / "mine.nc").write_text("mine")
+    assert main([*options[:-2], str(tmp_path / "mine.nc"), "--quiet", "--overwrite"]) == 2
+    assert (tmp_path / "mine.nc").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "--n", "2"], "at least 3"),
+        (["run", "--t", "-1"], "duration must be a positive finite number"),
+        (["run", "--dt", "0.1", "--tol", "0.1"], "give dt or tol, not both"),
+        (["run", "--dt", "1e-300"], "more than can be counted"),
+        (["run", "--shear-stiffness", "1"], "parameter of the chain must be one of"),
+        (["run", "--rolling", "own", "--ends", "consistent"], "must be one of 'springs'"),
+        (["run", "--want", "colour"], "want must be one of"),
+        (["run", "--overwrite"], "--overwrite goes with --save FILE"),
+        (["run", "--save", "missing/run.nc"], "cannot be written"),
+        (["run", "--n", str(10**14)], "too large for this machine's memory"),
+        (["info", "missing.nc"], "cannot be read"),
+        (["plot", "missing.nc"], "cannot be read"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(arguments, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err
+    assert printed.err.startswith("error: ")
+    assert printed.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["walk"], ["run", "--n", "many"], ["run", "--ends", "ring"], ["run", "--method", "euler"], ["info"]]
+)
+def test_unknown_words_are_refused_by_usage(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    assert "usage: python -m discs" in capsys.readouterr().err
+
+
+def test_motion_that_cannot_go_on(tmp_path, capsys):
+    path = tmp_path / "run.nc"
+    options = ["--n", "33", "--method", "leapfrog", "--dt", "0.05", "--save", str(path), "--quiet", "--engine", "plain"]
+    assert main(["run", *options]) == 1
+    assert "blew up" in capsys.readouterr().err
+    assert main(["info", str(path)]) == 0
+    assert "unfinished: " in capsys.readouterr().out
+
+
+def test_interrupted(tmp_path):
+    path = tmp_path / "run.nc"
+    command = [sys.executable, "-m", "discs", "run", "--n", "40", "--dt", "1e-3", "--frames", "4501", "--save", str(path)]
+    process = subprocess.Popen([*command, "--engine", "plain", "--quiet"], stderr=subprocess.PIPE, text=True)
+    while not path.exists():
+        time.sleep(0.02)
+    time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert re.fullmatch(r"interrupted at step \d+; .*run.nc holds \d+ of 4501 frames, and the same call goes on from there\n", said)
+    assert 0 < load(path).t.size < 4501
+
+
+def test_pictures_are_those_of_solution(tmp_path, capsys, monkeypatch):
+    path = tmp_path / "run.nc"
+    simulate(untwisting_chain(5), dt=0.05, frames=2, progress=False, engine="plain").save(path)
+    from matplotlib.figure import Figure
+
+    monkeypatch.setattr(Solution, "plot", lambda self: [Figure().subplots()], raising=False)
+    for name in ("animate", "view"):
+        monkeypatch.setattr(Solution, name, lambda self, out, name=name: out.write_text(f"{name} {self.s.size}"), raising=False)
+    assert main(["plot", str(path), "--out", str(tmp_path / "a.png")]) == 0
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["animate", str(path), "--out", str(tmp_path / "a.mp4")]) == 0
+    assert main(["view", str(path), "--out", str(tmp_path / "a.html")]) == 0
+    assert ((tmp_path / "a.mp4").read_text(), (tmp_path / "a.html").read_text()) == ("animate 5", "view 5")
+    assert capsys.readouterr().out.count("written to") == 3
+    assert main(["plot", str(path), "--out", str(tmp_path / "a.xyz")]) == 2
+    assert "error: Format 'xyz' is not supported" in capsys.readouterr().err
+    monkeypatch.delattr(Solution, "view")
+    if not hasattr(Solution, "view"):
+        assert main(["view", str(path), "--out", str(tmp_path / "b.html")]) == 2
+
+
+def subparsers(p):
+    yield p
+    for action in p._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for child in action.choices.values():
+                yield from subparsers(child)
+
+
+@pytest.mark.parametrize("make", [parser, parser_of_continuum], ids=["discs", "continuum"])
+def test_every_option_says_what_it_is_and_its_default(make):
+    switches = (argparse._StoreTrueAction, argparse._HelpAction, argparse._SubParsersAction)
+    for p in subparsers(make()):
+        assert p.format_help()
+        for action in p._actions:
+            assert action.help or isinstance(action, argparse._SubParsersAction), action
+            if action.option_strings and not isinstance(action, switches):
+                assert "(default: " in action.help, action
+                assert np.isscalar(action.default) or action.default in (None, []), action

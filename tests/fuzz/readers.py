@@ -1,0 +1,99 @@
+"""Coverage-guided fuzzing of everything that reads a file: scenes in TOML, archives, restart files.
+
+    pip install atheris
+    python tests/fuzz/readers.py -max_total_time=600 -timeout=20 -rss_limit_mb=3000 -len_control=0 -max_len=65536 corpus/
+
+Not part of the tests. A reader may raise ValueError and nothing else; an archive that was changed is refused or is the same run.
+The first byte of an input chooses what it is: a TOML file, bytes of an archive, changes to a whole archive, or to a restart file.
+"""
+
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+import atheris
+
+with atheris.instrument_imports(include=["discs", "continuum", "tomllib"]):
+    from continuum.files import read_scene
+    from discs import Solution, archive, load, recording, simulate
+    from discs.twist import untwisting_chain
+
+FOLDER = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+QUANTITIES = ("x", "y", "theta", "omega", "energy")
+
+
+def seeds() -> tuple[Solution, bytes, bytes]:
+    """A run, its archive and the restart file of one that did not end."""
+    problem = untwisting_chain(4, duration=0.1)
+    run = simulate(problem, dt=0.05, frames=3, engine="plain", progress=False)
+    run.save(FOLDER / "run.nc")
+
+    class Stop(Exception):
+        pass
+
+    def stop(path: object, stats: object) -> None:
+        raise Stop
+
+    recording.SECONDS, finish, archive.finish = -1e9, archive.finish, stop  # type: ignore[assignment]
+    try:
+        simulate(problem, dt=0.05, frames=3, engine="plain", progress=False, checkpoint=FOLDER / "killed.nc")
+    except Stop:
+        archive.finish = finish
+    return run, (FOLDER / "run.nc").read_bytes(), (FOLDER / "killed.nc.restart").read_bytes()
+
+
+RUN, WHOLE, RESTART = seeds()
+TOML = b'scene = "steered_rod"\nduration = 0.5\nshear_stiffness = 6.0\nradius = 0.7\n'
+
+
+def changed(data: atheris.FuzzedDataProvider, whole: bytes) -> bytes:
+    """Some places of a file changed, some cut out, perhaps the end cut off."""
+    content = bytearray(whole)
+    for _ in range(data.ConsumeIntInRange(0, 8)):
+        place = data.ConsumeIntInRange(0, len(content) - 1)
+        part = data.ConsumeBytes(data.ConsumeIntInRange(0, 9))
+        content[place : place + len(part)] = part
+    return bytes(content[: data.ConsumeIntInRange(0, len(content))]) if data.ConsumeBool() else bytes(content)
+
+
+def one_input(content: bytes) -> None:
+    """Read one file."""
+    data = atheris.FuzzedDataProvider(content)
+    kind, path = data.ConsumeIntInRange(0, 3), FOLDER / "input"
+    try:
+        if kind == 0:
+            path.write_bytes(data.ConsumeBytes(4096))
+            scene = read_scene(path)
+            assert scene.duration > 0
+        elif kind == 3:
+            path.write_bytes(changed(data, RESTART))
+            recording.read_restart(path)
+        else:
+            path.write_bytes(data.ConsumeBytes(1 << 16) if kind == 1 else changed(data, WHOLE))
+            found = load(path)
+            for name in QUANTITIES:
+                value = getattr(found, name)
+                assert value.tobytes() == getattr(RUN, name)[: len(value)].tobytes(), name
+    except ValueError:
+        pass
+
+
+def main() -> None:
+    """Fuzz, from a corpus folder with what is whole in it."""
+    warnings.simplefilter("ignore")
+    for folder in (a for a in sys.argv[1:] if not a.startswith("-")):
+        Path(folder).mkdir(exist_ok=True)
+        for name, content in (
+            ("toml", TOML + b"\x00"),
+            ("archive", WHOLE + b"\x01"),
+            ("changes", b"\x01\x02"),
+            ("restart", b"\x01\x03"),
+        ):
+            (Path(folder) / name).write_bytes(content)
+    atheris.Setup(sys.argv, one_input)
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main()
