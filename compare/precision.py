@@ -184,7 +184,9 @@ def peers(problem: Problem) -> list[Peer]:
     if find_spec("sksundae"):
         found += [*reduced.sundials_peers(problem, f), reduced.multiplier_peer(problem)]
     if find_spec("diffrax") and problem.chain.ends == "springs":
-        found += reduced.diffrax_peers(problem)
+        from compare.peers.in_jax import diffrax_peers
+
+        found += diffrax_peers(problem)
     if find_spec("exudyn"):
         from compare.peers.exudyn_chain import exudyn_steered_peer
         from compare.peers.exudyn_field import exudyn_field_peer
