@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.chain import SteeredChain
-from discs.kernels import blocks, chain
-from discs.kernels.banded import reciprocal
+from discs.kernels import chain
 from discs.kernels.compiled import fill, part
 from discs.kernels.shared import forward, renew
+from discs.kernels.steered_matrix import Matrix, assemble, factor, solve
 
 
 class Steered(NamedTuple):
@@ -44,18 +44,6 @@ def parameters(
     padded[:, 0] = padded[:, -1]
     paces = np.stack([given.radius / roots[0], 1 / roots[0], 1 / roots[1]])
     return Steered(weights, paces, padded, scale, shift, given.k, ring)
-
-
-class Matrix(NamedTuple):
-    """A factored matrix: `blocks`, and around a ring the columns of the last disc, which borders the rest.
-
-    columns : (2, 2, n), solutions for the border; edge : (11,), the border's two blocks and the inverse of its Schur complement.
-    """
-
-    d: NDArray
-    o: NDArray
-    columns: NDArray
-    edge: NDArray
 
 
 class Work(NamedTuple):
@@ -314,117 +302,6 @@ def _pullback(chain, work, move, c, g):
     secant(chain, work, move, False)
     tensions(chain, work)
     pulled(work, c, g)
-
-
-@part
-def assemble(chain, work, c, one, g, d, o):
-    """Entries of `one` I + g C^T B^T (stiffness) B C for the mean geometry in `work`."""
-    n = c.shape[1]
-    per = 1 / chain.k
-    cx, cy, ct, cp = c[0], c[1], c[2], c[3]
-    along_x, along_y, across_x, across_y = work.along[0], work.along[1], work.across[0], work.across[1]
-    k0, k1, k2, k3 = chain.stiffness[0], chain.stiffness[1], chain.stiffness[2], chain.stiffness[3]
-    p, q, r = d[0], d[1], d[2]
-    for i in range(n):
-        p[i], q[i], r[i] = one, 0.0, one
-    o0, o1 = o[0], o[1]
-    for side in range(2):  # the links before discs and after them: along and across C, and torsion and bending of links
-        sign = 1.0 - 2.0 * side
-        ax, ay, bx, by = along_x[side:], along_y[side:], across_x[side:], across_y[side:]
-        s0, s1, s2, s3 = k0[side:], k1[side:], k2[side:], k3[side:]
-        for i in range(n):
-            normal, shear = ax[i] * cx[i] + ay[i] * cy[i], ax[i] * cy[i] - ay[i] * cx[i]
-            o0[i], o1[i] = normal, shear
-        for i in range(n):
-            t = ct[i] * per
-            p[i] += g * (s0[i] * o0[i] * o0[i] + s1[i] * o1[i] * o1[i] + s2[i] * t * t)
-        for i in range(n):
-            q[i] += sign * g * 0.5 * cp[i] * (s0[i] * o0[i] * bx[i] + s1[i] * o1[i] * by[i])
-        for i in range(n):
-            b = cp[i] * per
-            r[i] += g * (0.25 * cp[i] * cp[i] * (s0[i] * bx[i] * bx[i] + s1[i] * by[i] * by[i]) + s3[i] * b * b)
-    # o0, o1 hold what the links after discs make of these discs; the same links make n1, q1 of the next ones
-    for i in range(n - 1):
-        couple(i, i + 1, c, g, per, chain.stiffness, work.along, work.across, o)
-    if chain.ring:
-        couple(n - 1, 0, c, g, per, chain.stiffness, work.along, work.across, o)
-    else:
-        for row in range(4):
-            o[row, n - 1] = 0.0
-
-
-@part
-def couple(i, j, c, g, per, stiffness, along, across, o):
-    """The block of disc i and the next, j, from the link i + 1 between them; o[:2, i] are its stretch and shear by disc i's
-    roll."""
-    link = i + 1
-    n0, q0 = -o[0, i], -o[1, i]
-    n1, q1 = along[0, link] * c[0, j] + along[1, link] * c[1, j], along[0, link] * c[1, j] - along[1, link] * c[0, j]
-    h0, h1 = 0.5 * c[3, i], 0.5 * c[3, j]
-    n, q = g * stiffness[0, link], g * stiffness[1, link]
-    x, y = across[0, link], across[1, link]
-    o[0, i] = n * n0 * n1 + q * q0 * q1 - g * stiffness[2, link] * (c[2, i] * per) * (c[2, j] * per)
-    o[1, i] = h1 * (n * n0 * x + q * q0 * y)
-    o[2, i] = h0 * (n * n1 * x + q * q1 * y)
-    o[3, i] = h0 * h1 * (n * x * x + q * y * y) - g * stiffness[3, link] * (c[3, i] * per) * (c[3, j] * per)
-
-
-@part
-def border(m):
-    """Factor a ring's matrix: the chain without its last disc, and what that adds."""
-    last = m.d.shape[1] - 1
-    e, first, second = m.edge, m.columns[0, :, :last], m.columns[1, :, :last]
-    for i in range(4):
-        e[i] = m.o[i, last]  # last disc (rows) with disc 0
-        e[4 + i] = m.o[i, last - 1]  # disc last - 1 (rows) with the last
-    blocks.factor(m.d[:, :last], m.o[:, :last])
-    first[:], second[:] = 0, 0
-    first[0, 0] += e[0]
-    first[1, 0] += e[1]
-    second[0, 0] += e[2]
-    second[1, 0] += e[3]
-    first[0, last - 1] += e[4]
-    first[1, last - 1] += e[6]
-    second[0, last - 1] += e[5]
-    second[1, last - 1] += e[7]
-    blocks.substitute(m.d[:, :last], m.o[:, :last], first)
-    blocks.substitute(m.d[:, :last], m.o[:, :last], second)
-    x = m.d[0, last] - across_border(e, 0, first)
-    y = m.d[1, last] - across_border(e, 0, second)
-    z = m.d[2, last] - across_border(e, 1, second)
-    det = reciprocal(x * z - y * y)
-    e[8], e[9], e[10] = z * det, -y * det, x * det
-
-
-@part
-def across_border(e, row, b):
-    """Row of the last disc's coupling to the others, times b (2, n - 1)."""
-    end = b.shape[1] - 1
-    return e[2 * row] * b[0, 0] + e[2 * row + 1] * b[1, 0] + e[4 + row] * b[0, end] + e[6 + row] * b[1, end]
-
-
-@part
-def factor(chain, m):
-    if chain.ring:
-        border(m)
-    else:
-        blocks.factor(m.d, m.o)
-
-
-@part
-def solve(chain, m, b):
-    if not chain.ring:
-        blocks.substitute(m.d, m.o, b)
-        return
-    last, e = b.shape[1] - 1, m.edge
-    inner = b[:, :last]
-    blocks.substitute(m.d[:, :last], m.o[:, :last], inner)
-    x, y = b[0, last] - across_border(e, 0, inner), b[1, last] - across_border(e, 1, inner)
-    x, y = e[8] * x + e[9] * y, e[9] * x + e[10] * y
-    for row in range(2):
-        for i in range(last):
-            b[row, i] -= m.columns[0, row, i] * x + m.columns[1, row, i] * y
-    b[0, last], b[1, last] = x, y
 
 
 @fill(chain.sweep, Steered)
