@@ -18,7 +18,7 @@ from discs.figures import given_or_new
 from discs.style import BLUE, GREEN, GREY, ORANGE, PURPLE
 
 if TYPE_CHECKING:
-    from compare.hard_cases import Growth
+    from compare.hard_problems import Growth
     from compare.precision import WorkPrecision
     from compare.stability_table import Stability
     from compare.study import Study

@@ -13,7 +13,9 @@ import pytest
 
 from compare import lump, stability
 from compare.__main__ import main
-from compare.hard_cases import OURS, PEERS, Expectation, Found, cases, rolling_waves
+from compare.hard_cases import cases
+from compare.hard_problems import rolling_waves
+from compare.hard_runs import OURS, PEERS, Expectation, Found
 from compare.stability_table import kept
 from continuum import untwisting_rod
 from continuum.dispersion import growth
@@ -142,14 +144,14 @@ def test_verdicts():
 
 def test_a_failing_method_is_shown_as_one(monkeypatch):
     """A kernel that loses energy: bold in the grid, and told in the summary."""
-    import compare.hard_cases
+    import compare.hard_runs
 
     def leaky(problem, *arguments, **keywords):
         run = simulate(problem, *arguments, **keywords)
         run.energy[-1] *= 1.5
         return run
 
-    monkeypatch.setattr(compare.hard_cases, "simulate", leaky)
+    monkeypatch.setattr(compare.hard_runs, "simulate", leaky)
     with ThreadPoolExecutor(1) as here:
         found = stability(True, names=("rough random roll",), methods=("midpoint",), seconds=9.0, executor=here, progress=False)
     assert found.failures
