@@ -13,7 +13,7 @@ from compare.hard_runs import EXPLICIT, FRAMES, Found, march, motion, posed
 from compare.lump import lump
 from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.dispersion import frequency, growth, symbols
-from continuum.exact import ring
+from continuum.exact import ring, standing_wave
 from continuum.scenes import SCENES
 from discs import Leapfrog, Problem, Solution, State
 from discs.marching import March
@@ -46,12 +46,10 @@ def turned(problem: Problem, angle: float, move: tuple[float, float]) -> Problem
 
 
 def torsion_wave(problem: Problem) -> NDArray:
-    """R = 0: nothing moves, and the twist, an eigenvector of the chain with half shares at its ends, is a standing wave of
-    frequency^2 beta/alpha (4/k^2) sin^2(pi k/2 length)."""
-    chain, start = problem.chain, problem.initial
-    rate = 2 / chain.k * np.sin(np.pi * chain.k / (2 * chain.length))
-    rate *= np.sqrt(np.max(chain.torsion_stiffness) / np.max(chain.spin_inertia))
-    return np.array([start.x, start.y, np.asarray(start.theta) * np.cos(rate * problem.duration)])
+    """R = 0: nothing moves, and the paper's twist is a standing wave of the discs."""
+    s, start = problem.chain.s, problem.initial
+    wave = standing_wave(untwisting_rod(radius=0.0).rod, s, [problem.duration], 1, float(np.asarray(start.theta)[0]), n=s.size)
+    return np.array([wave.x[0], wave.y[0], wave.theta[0]])
 
 
 def folding(problem: Problem, run: Solution) -> str:

@@ -57,7 +57,6 @@ class Expectation:
     error : largest error of any method.
     must : methods of ours that must keep to it. The others may stop, or say that steps did not converge or a warning: what no
         method may do is to be lost without a word.
-    may_refuse : a refusal at the start will do as well.
     """
 
     kind: str
@@ -65,7 +64,6 @@ class Expectation:
     energy: float = LOOSE
     error: float = np.inf
     must: tuple[str, ...] = ()
-    may_refuse: bool = False
 
     def verdict(self, method: str, found: Found) -> str:
         """ "holds", "says so" (off, and not silently), "lost", or the outcome of a run that was not done."""
@@ -83,9 +81,7 @@ class Expectation:
             return None
         if self.kind == "must refuse":
             return verdict in ("refused", "stopped")
-        if verdict == "refused":
-            return self.may_refuse
-        return verdict == "holds" if method in self.must else verdict != "lost"
+        return verdict == "holds" if method in self.must else verdict not in ("lost", "refused")
 
 
 @lru_cache(2)
