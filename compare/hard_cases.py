@@ -107,10 +107,10 @@ def cases(quick: bool = False) -> list[Case]:
         run = partial(motion, partial(lumped, scene, 33, **keywords))
         add("extreme parameters", setting, what, bound(words, energy=1e-9), run)
 
-    # after 7/8 of a period a wrong frequency shows; h = t/100 of second order is off by omega^3 h^2 t/24 = 7e-4 in phase
+    # after 7/8 of a period a wrong frequency shows; midpoint, h < t/100, is off by omega^3 h^2 t/12 < 1.4e-3 in phase
     run = partial(motion, partial(twisted, 33, radius=0.0, duration=7.8), exact=torsion_wave)
-    words = "the line does not move, and the twist is the exact standing wave to 1e-3; energy to 1e-3"
-    still = Expectation("exact", words, energy=1e-3, error=1e-3, must=OURS)
+    words = "the line does not move, and the twist is the exact standing wave to 2e-3; energy to 1e-3"
+    still = Expectation("exact", words, energy=1e-3, error=2e-3, must=OURS)
     add("extreme parameters", "R = 0", "points that cannot roll: a torsion wave is all that is left", still, run)
 
     few = "few discs", "a chain still makes sense as long as there is something to bend"
