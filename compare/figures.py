@@ -18,7 +18,7 @@ from discs.figures import given_or_new
 from discs.style import BLUE, GREEN, GREY, ORANGE, PURPLE
 
 if TYPE_CHECKING:
-    from compare.hard_cases import Growth
+    from compare.hard_problems import Growth
     from compare.precision import WorkPrecision
     from compare.stability_table import Stability
     from compare.study import Study
@@ -51,7 +51,7 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
         line = beside * level * (n / n[-1]) ** -slope
         ax.plot(n, line, color=GREY, linewidth=1)
         above = "bottom" if beside > 1 else "top"
-        ax.text(n[0], line[0], f"slope {slope}", color=GREY, ha="right", va=above)
+        ax.text(np.sqrt(n[0] * n[-1]), np.sqrt(line[0] * line[-1]), f"slope {slope}", color=GREY, va=above)
     floor = max(s.floor for s in studies)
     if floor > 0:
         ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label="estimated error of the field")

@@ -31,6 +31,7 @@ from compare.stability_table import stability
 from compare.study import Study, convergence
 from continuum import Scene, solve, untwisting_rod
 from discs import Problem, Solution, checks
+from discs.style import BLUE, GREEN, ORANGE
 
 SIZES = (17, 33, 65, 129, 257)
 LAWS = {"field": "the paper's law, ṙ = RωJr'", "unit": "true rolling, ṙ = RωJr'/|r'|"}
@@ -201,8 +202,8 @@ def _laws(page: Page, fields: dict[str, Solution]) -> None:
         [np.abs(getattr(a, f)[:, :: every[0]] - getattr(b, f)[:, :: every[1]]).max(axis=1) for f in ("x", "y", "theta")]
     )
     ax = Figure(figsize=(6.8, 4.0), layout="constrained").subplots()
-    for name, row in zip(("x", "y", "θ"), distance, strict=True):
-        ax.plot(a.t, row, "o-", label=name)
+    for name, row, colour in zip(("x", "y", "θ"), distance, (ORANGE, BLUE, GREEN), strict=True):
+        ax.plot(a.t, row, "o-", label=name, color=colour)
     ax.set_xlabel("time t")
     ax.set_ylabel("largest distance (length, rad)")
     ax.legend()

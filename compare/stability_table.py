@@ -13,7 +13,9 @@ import numpy as np
 
 from compare import figures
 from compare.background import background
-from compare.hard_cases import OURS, PEERS, RTOL, TOL, Case, Found, Growth, cases, rolling_waves
+from compare.hard_cases import Case, cases
+from compare.hard_problems import Growth, rolling_waves
+from compare.hard_runs import OURS, PEERS, RTOL, TOL, Found
 from compare.sweeps import Result, read, sweep
 from discs import checks
 
@@ -22,7 +24,7 @@ MARK = {"holds": "holds", "says so": "says so", "lost": "LOST", "refused": "refu
 
 
 class Row(NamedTuple):
-    """One method on one case: see `compare.hard_cases.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or "" of
+    """One method on one case: see `compare.hard_runs.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or "" of
     peers and where nothing was seen."""
 
     case: str

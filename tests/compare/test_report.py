@@ -5,11 +5,13 @@ import shutil
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from urllib.parse import unquote
 
 import pytest
 
 from compare import report as module
+from compare import stability
 from compare.__main__ import main
 from compare.hard_cases import cases
 from compare.report import Page, report
@@ -28,12 +30,14 @@ def here(processes=1):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """A small report, in this process."""
+    """A small report, whole, in this process; stability and speed have tests of their own, with all methods and peers."""
     out = tmp_path_factory.mktemp("report")
-    few = [c for c in cases(True) if c.name in ("few discs", "step above the explicit limit")]
+    few = [c for c in cases(True) if c.name == "few discs" or c.setting.startswith("N = 33, h =")]
+    methods = ("midpoint", "gauss6", "leapfrog", "SciPy BDF")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "background", here)
         patch.setattr(module, "speed_peers", lambda problem: [])
+        patch.setattr(module, "stability", partial(stability, methods=methods))
         patch.setattr("compare.stability_table.cases", lambda quick: few)
         patch.setattr("compare.stability_table._listed", lambda quick: {c.key: c for c in few})
         report(out, n=(9, 17), tol=1e-2, timed=9, long=0.2, progress=False)

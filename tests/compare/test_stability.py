@@ -1,20 +1,17 @@
 """Hard cases: each expectation is met at small size, a failure is shown as one, and interrupted tables go on."""
 
 import csv
-import os
-import signal
-import subprocess
-import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from compare import lump, stability
+from compare import lump, stability, stability_table
 from compare.__main__ import main
-from compare.hard_cases import OURS, PEERS, Expectation, Found, cases, rolling_waves
-from compare.stability_table import kept
+from compare.hard_cases import cases
+from compare.hard_problems import rolling_waves
+from compare.hard_runs import OURS, PEERS, Expectation, Found
+from compare.sweeps import read
 from continuum import untwisting_rod
 from continuum.dispersion import growth
 from continuum.scenes import rolling_rod
@@ -34,7 +31,7 @@ LOST = {
 @pytest.fixture(scope="module")
 def table():
     with ThreadPoolExecutor(1) as here:
-        return stability(quick=True, methods=("midpoint", "gauss6", "leapfrog", "rk4"), seconds=5.0, executor=here, progress=False)
+        return stability(quick=True, methods=("midpoint", "gauss6", "leapfrog", "rk4"), seconds=60.0, executor=here, progress=False)
 
 
 def test_ours_do_as_expected_but_for_what_is_known(table):
@@ -96,9 +93,11 @@ def test_the_ring_stops_in_time(table):
         assert found.error < 0.03  # a step, and the last 1e-3 of the slope
 
 
-def test_a_rod_without_radius_is_refused_or_exact(table):
-    found = one(table, "extreme parameters", "R = 0", "gauss6").found
-    assert found.outcome == "refused" or found.error < 1e-6
+def test_points_turn_as_the_exact_wave_by_every_method():
+    (case,) = (c for c in SMALL if c.setting == "R = 0")
+    found = {method: case.run(method, 60.0) for method in OURS}
+    assert all(case.expectation.met(method, f) for method, f in found.items()), found
+    assert all(found[method].error < 1e-6 for method in ("suzuki4", "kahanli6", "gauss4", "gauss6", "gauss8", "rk4"))
 
 
 def test_rounding(table):
@@ -142,14 +141,13 @@ def test_verdicts():
 
 def test_a_failing_method_is_shown_as_one(monkeypatch):
     """A kernel that loses energy: bold in the grid, and told in the summary."""
-    import compare.hard_cases
 
     def leaky(problem, *arguments, **keywords):
         run = simulate(problem, *arguments, **keywords)
         run.energy[-1] *= 1.5
         return run
 
-    monkeypatch.setattr(compare.hard_cases, "simulate", leaky)
+    monkeypatch.setattr("compare.hard_runs.simulate", leaky)
     with ThreadPoolExecutor(1) as here:
         found = stability(True, names=("rough random roll",), methods=("midpoint",), seconds=9.0, executor=here, progress=False)
     assert found.failures
@@ -167,31 +165,45 @@ def test_table_has_every_case_and_method():
     assert simulate(lump(untwisting_rod(duration=0.1), 9), "midpoint", progress=False).stats["method"] in OURS
 
 
-def test_command_line(tmp_path, capsys, monkeypatch):
-    few = [c for c in cases(True) if c.name in ("few discs", "step above the explicit limit")]
-    monkeypatch.setattr("compare.stability_table.cases", lambda quick: few)
-    monkeypatch.setattr("compare.stability_table.background", lambda: ThreadPoolExecutor(1))
-    monkeypatch.setattr("compare.stability_table._listed", lambda quick: {c.key: c for c in few})
-    assert main(["stability", "--quick", "--quiet", "--out", str(tmp_path)]) == 0
+@pytest.fixture
+def few(monkeypatch):
+    """Two sorts of cases only, run in this process, and once interrupted; the orders that are run."""
+    found = [c for c in SMALL if c.name in ("few discs", "step above the explicit limit")]
+    ran, run, interrupts = [], stability_table._run, [KeyboardInterrupt()]
+
+    def noted(order):
+        ran.append(order)
+        if len(ran) == 20 and interrupts:
+            raise interrupts.pop()
+        return run(order)
+
+    monkeypatch.setattr(stability_table, "cases", lambda quick: found)
+    monkeypatch.setattr(stability_table, "_listed", lambda quick: {c.key: c for c in found})
+    monkeypatch.setattr(stability_table, "background", lambda: ThreadPoolExecutor(1))
+    monkeypatch.setattr(stability_table, "_run", noted)
+    return ran
+
+
+def test_command_line_keeps_what_an_interrupt_leaves_and_goes_on(tmp_path, capsys, few):
+    """A real interrupt stops the processes of a sweep, see test_sweeps: here it comes out of the 20th run."""
+    command = ["stability", "--quick", "--quiet", "--seconds", "60", "--out", str(tmp_path)]
+    assert main(command) == 130
+    assert "holds what was found; the same command goes on" in capsys.readouterr().err
+    before = [result.case for result in read(tmp_path / "stability.jsonl")]
+    assert 5 <= len(rows(tmp_path)) == len(before) <= 19
+    few.clear()
+    assert main(command) == 0
+    assert few
+    assert not any(order in before for order in few)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["stability.csv", "stability.md", "stability.png"]
     assert "refused" in capsys.readouterr().out
-    rows = list(csv.DictReader((tmp_path / "stability.csv").read_text(encoding="utf-8").splitlines()))
-    assert {row["case"] for row in rows} == {c.name for c in few}
+    assert {row["case"] for row in rows(tmp_path)} == {"few discs", "step above the explicit limit"}
+    assert len(rows(tmp_path)) == len(before) + len(few)
     assert "## What is expected" in (tmp_path / "stability.md").read_text(encoding="utf-8")
 
 
-def test_an_interrupt_keeps_what_is_there(tmp_path):
-    command = [sys.executable, "-m", "compare", "stability", "--quick", "--quiet", "--out", str(tmp_path)]
-    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    archive, begun = tmp_path / "stability.jsonl", time.monotonic()
-    while not archive.exists() or len(kept(archive, True).rows) < 5:
-        time.sleep(0.05)
-        assert run.poll() is None
-        assert time.monotonic() - begun < 60
-    os.killpg(run.pid, signal.SIGINT)  # as a terminal sends it
-    assert "holds what was found" in run.communicate(timeout=60)[1]
-    assert run.returncode == 130
-    assert len(list(csv.DictReader((tmp_path / "stability.csv").read_text(encoding="utf-8").splitlines()))) >= 5
+def rows(folder):
+    return list(csv.DictReader((folder / "stability.csv").read_text(encoding="utf-8").splitlines()))
 
 
 def test_bad_input():

@@ -75,14 +75,14 @@ def test_failures_are_reported_and_tried_again(tmp_path):
     assert [r.error for r in read(file)] == [""] * 4
 
 
-def counted(calls):
-    """A function with the name of `picky` that notes what it is called with."""
+def counted(calls, module=__name__, name="picky"):
+    """A function with the name of another that notes what it is called with."""
 
     def function(case):
         calls.append(case)
         return case
 
-    function.__module__, function.__qualname__ = picky.__module__, "picky"
+    function.__module__, function.__qualname__ = module, name
     return function
 
 
@@ -132,7 +132,10 @@ def test_a_killed_sweep_resumes(tmp_path):
     run.wait()
     kept = read(file)
     assert 3 <= len(kept) < 200
-    subprocess.run([*command, str(len(kept) + 2), "threads"], check=True, timeout=60)
+    calls = []
+    with ThreadPoolExecutor(1) as executor:  # here, under the name of the killed one's function
+        sweep(counted(calls, "__main__", "slow"), range(len(kept) + 2), executor, file, progress=False)
+    assert calls == [len(kept), len(kept) + 1]
     found = {r.case: r for r in read(file)}
     assert sorted(found) == list(range(len(kept) + 2))
     assert all(found[r.case] == r for r in kept)  # and not run again
