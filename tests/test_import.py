@@ -5,7 +5,19 @@ import sys
 
 import pytest
 
-IDLE = "PIL distributed h5netcdf h5py imageio_ffmpeg markdown_it matplotlib numba pymunk sympy xarray".split()
+IDLE = [
+    "PIL",
+    "distributed",
+    "h5netcdf",
+    "h5py",
+    "imageio_ffmpeg",
+    "markdown_it",
+    "matplotlib",
+    "numba",
+    "pymunk",
+    "sympy",
+    "xarray",
+]
 
 
 def ask(code: str) -> str:
@@ -17,7 +29,7 @@ def ask(code: str) -> str:
     [
         ("discs", [*IDLE, "scipy.integrate", "scipy.interpolate", "scipy.optimize"]),
         ("continuum", IDLE),
-        ("compare", "exudyn jax mujoco numba sksundae sympy xarray".split()),  # pictures are its work
+        ("compare", ["exudyn", "jax", "mujoco", "numba", "sksundae", "sympy", "xarray"]),  # pictures are its work
     ],
 )
 def test_import_brings_nothing_idle(package, idle):
