@@ -5,8 +5,11 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check --editable
 # one thread for linear algebra: the matrices are small, threads only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+# what touches every dependency, in a minute or two
+MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
+    $(addprefix continuum/test_, cells.py lagrangian.py))
 
-.PHONY: run test docs clean
+.PHONY: run test docs minimal coverage clean
 
 run: .venv/run
 	$(BIN)/python -m compare --out out
@@ -23,6 +26,14 @@ docs: .venv/docs
 	$(BIN)/jupyter nbconvert --log-level WARN --execute --to notebook --output-dir out/notebooks notebooks/*.ipynb
 	$(BIN)/mkdocs build --strict
 
+# the oldest versions that pyproject.toml allows, in an environment of their own, which stays
+minimal: .venv/minimal
+	.venv/oldest/bin/python -m pytest $(MINIMAL)
+
+# lines of discs and continuum that their tests reach, without the compiled kernels
+coverage: .venv/test
+	$(BIN)/pytest --cov --cov-report=term-missing tests/discs tests/continuum
+
 .venv/made:
 	$(PYTHON) -m venv .venv
 	touch $@
@@ -34,6 +45,12 @@ docs: .venv/docs
 # where a peer has no wheel its tests are skipped, and say so
 .venv/test: .venv/made pyproject.toml
 	$(PIP) ".[test,peers]" || $(PIP) ".[test]"
+	touch $@
+
+.venv/minimal: .venv/made pyproject.toml
+	$(BIN)/pip install --quiet --disable-pip-version-check uv
+	$(BIN)/uv venv --quiet --clear --python 3.11 .venv/oldest
+	VIRTUAL_ENV=.venv/oldest $(BIN)/uv pip install --quiet --resolution lowest-direct --editable ".[test]"
 	touch $@
 
 .venv/docs: .venv/made pyproject.toml

@@ -8,7 +8,6 @@ import json
 import shutil
 import zlib
 from dataclasses import fields
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -118,6 +117,8 @@ def rebuild(told: dict[str, Any], arrays: dict[str, NDArray]) -> Problem:
 
 def versions() -> dict[str, str]:
     """Versions of what a run depends on."""
+    from importlib.metadata import PackageNotFoundError, version  # slow to import
+
     found = {"python": python_version()}
     for name in ("rolling-discs", "numpy", "scipy", "numba"):
         try:

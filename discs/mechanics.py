@@ -26,10 +26,10 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # its integrate, slow to import, when it is used
 import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, spsolve
@@ -270,7 +270,7 @@ class MechanicalSystem:
         def rate(_: float, z: NDArray) -> NDArray:
             return np.concatenate([z[m:], self.accelerations(z[:m], z[m:]).acceleration])
 
-        found = solve_ivp(rate, (t[0], t[-1]), np.concatenate([q, v]), "DOP853", t, rtol=rtol, atol=1e-3 * rtol)
+        found = scipy.integrate.solve_ivp(rate, (t[0], t[-1]), np.concatenate([q, v]), "DOP853", t, rtol=rtol, atol=1e-3 * rtol)
         if not found.success:
             raise ValueError(f"the motion could not be followed beyond t = {found.t[-1]:g}: {found.message}")
         path, speed = found.y[:m].T, found.y[m:].T

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy.integrate
+import scipy  # its integrate, slow to import, when it is used
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
@@ -130,7 +130,7 @@ class SolveIvp(Integrator, ABC):
 class Course:
     """A running SciPy solver, seen at a time: it steps ahead as far as it is asked to and is interpolated."""
 
-    def __init__(self, f: Reduced, solver: scipy.integrate.OdeSolver, time: float, z: Phase) -> None:
+    def __init__(self, f: Reduced, solver: "scipy.integrate.OdeSolver", time: float, z: Phase) -> None:
         self.f, self.solver, self.time = f, solver, time
         self.hi, self.lo, self.pi = z
 

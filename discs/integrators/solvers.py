@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy  # its integrate, slow to import, when it is used
 import scipy.sparse as sp
-from scipy.integrate import LSODA, OdeSolver, Radau
 
 PARTS = ("data", "indices", "indptr")
 
@@ -31,9 +31,9 @@ class Factors:
         return self._factors.solve(b)
 
 
-def keep(solver: OdeSolver) -> dict[str, Any]:
+def keep(solver: "scipy.integrate.OdeSolver") -> dict[str, Any]:
     """What a solver remembers; nothing of an LSODA whose memory is hidden in Fortran (SciPy before 1.17) but its time."""
-    if isinstance(solver, LSODA):
+    if isinstance(solver, scipy.integrate.LSODA):
         ode = solver._lsoda_solver
         inner = ode._integrator
         if not hasattr(inner, "state_doubles"):
@@ -48,14 +48,14 @@ def keep(solver: OdeSolver) -> dict[str, Any]:
     return kept
 
 
-def recall(solver: OdeSolver, kept: dict[str, Any]) -> None:
+def recall(solver: "scipy.integrate.OdeSolver", kept: dict[str, Any]) -> None:
     """Make a new solver of the same problem remember what another one did."""
     if "replay" in kept:  # its steps do not depend on what they were asked for: take them again
         while solver.t < kept["replay"]:
             solver.step()
         return
     kept = dict(kept)
-    if isinstance(solver, LSODA):
+    if isinstance(solver, scipy.integrate.LSODA):
         ode = solver._lsoda_solver
         inner = ode._integrator
         ode._y, ode.t, inner.call_args[3] = kept.pop("inner_y"), float(kept.pop("inner_t")), int(kept.pop("istate"))
@@ -70,7 +70,7 @@ def recall(solver: OdeSolver, kept: dict[str, Any]) -> None:
             now[...] = value  # in place: some arrays are views of others
         else:
             setattr(solver, name, value if np.ndim(value) else value.item())
-    if isinstance(solver, Radau) and solver.t_old is not None:
+    if isinstance(solver, scipy.integrate.Radau) and solver.t_old is not None:
         solver.sol = solver._compute_dense_output()
 
 

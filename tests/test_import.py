@@ -1,0 +1,42 @@
+"""Importing is quick, and brings nothing that is not used."""
+
+import subprocess
+import sys
+
+import pytest
+
+IDLE = [
+    "PIL",
+    "distributed",
+    "h5netcdf",
+    "h5py",
+    "imageio_ffmpeg",
+    "markdown_it",
+    "matplotlib",
+    "numba",
+    "pymunk",
+    "sympy",
+    "xarray",
+]
+
+
+def ask(code: str) -> str:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize(
+    ("package", "idle"),
+    [
+        ("discs", [*IDLE, "scipy.integrate", "scipy.interpolate", "scipy.optimize"]),
+        ("continuum", IDLE),
+        ("compare", ["exudyn", "jax", "mujoco", "numba", "sksundae", "sympy", "xarray"]),  # pictures are its work
+    ],
+)
+def test_import_brings_nothing_idle(package, idle):
+    assert ask(f"import sys, {package}; print(*[m for m in {idle} if m in sys.modules])").split() == []
+
+
+def test_import_of_discs_is_quick():
+    """0.4 s on an idle machine, half of it SciPy's sparse matrices; seconds of the processor, the best of three, 1.5 allowed."""
+    code = "import time; start = time.process_time(); import discs; print(time.process_time() - start)"
+    assert min(float(ask(code)) for _ in range(3)) < 1.5
