@@ -26,9 +26,9 @@ docs: .venv/docs
 	$(BIN)/jupyter nbconvert --log-level WARN --execute --to notebook --output-dir out/notebooks notebooks/*.ipynb
 	$(BIN)/mkdocs build --strict
 
-# the oldest versions that pyproject.toml allows, in an environment of their own, which stays
+# the oldest versions that pyproject.toml allows, in an environment of their own; they warn of newer ones they meet there
 minimal: .venv/minimal
-	.venv/oldest/bin/python -m pytest $(MINIMAL)
+	.venv/oldest/bin/python -m pytest -W default $(MINIMAL)
 
 # lines of discs and continuum that their tests reach, without the compiled kernels
 coverage: .venv/test
