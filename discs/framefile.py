@@ -155,7 +155,7 @@ class FrameFile:
         return self.frames
 
     def solution(self, problem: Problem | None = None) -> Solution:
-        """The frames that are there; ValueError if there are none, or fewer than a complete file has. A `problem` known is not read."""
+        """The frames that are there; ValueError if there are none, or too few in a complete file. A known `problem` is not read."""
         count, missing = self.whole(), {}
         if count < self.frames:
             if self.attrs["complete"]:
