@@ -171,7 +171,7 @@ class Recording(Rows):
 def read_restart(path: Path) -> dict[str, Any]:
     """What a restart file says, arrays by name; ValueError if it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as kept:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as kept:
             return {name: kept[name] for name in kept.files}
     except (*DAMAGE, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
         raise ValueError(f"{_damaged(path)}: {error}") from None

@@ -140,7 +140,7 @@ def test_other_things_in_the_way(tmp_path, monkeypatch):
         simulate(problem, tol=1e-3, checkpoint=tmp_path / "run.nc")
     stopped(monkeypatch, 9, problem, **settled, checkpoint=tmp_path / "run.nc")
     good = (tmp_path / "run.nc.restart").read_bytes()
-    locked = re.sub(rb"(PK\x01\x02....)..", rb"\1\x01\x00", good, flags=re.DOTALL)  # members that ask for a password
+    locked = re.sub(rb"(PK\x01\x02....)..", lambda found: found[1] + b"\x01\x00", good, flags=re.DOTALL)  # a password is asked for
     for content in (b"PK nonsense", b"", good[: len(good) // 2], locked):
         (tmp_path / "run.nc.restart").write_bytes(content)
         with pytest.raises(ValueError, match=r"run\.nc\.restart is damaged; without it the run starts from the beginning, so"):
