@@ -171,6 +171,11 @@ def as_text(value: Any) -> str:
     return json.dumps(value, default=lambda number: number.tolist())
 
 
+def fixed(value: Any) -> Any:
+    """A text as one of fixed length, which HDF5 keeps in the header itself."""
+    return np.bytes_(value.encode()) if isinstance(value, str) else value
+
+
 def recorded(run: Solution) -> dict[str, NDArray]:
     """What the frames of a run hold, by name."""
     return {name: np.asarray(value) for name in QUANTITIES if (value := getattr(run, name)) is not None}
@@ -229,7 +234,7 @@ def finish(path: str | Path, stats: dict[str, Any]) -> None:
     with fresh(path) as temporary:
         shutil.copyfile(path, temporary)
         with h5py.File(temporary, "r+") as file:
-            file.attrs["stats"], file.attrs["complete"] = as_text(stats), 1
+            file.attrs["stats"], file.attrs["complete"] = fixed(as_text(stats)), 1
 
 
 def load(path: str | Path) -> Solution:

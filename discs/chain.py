@@ -9,6 +9,7 @@ from discs import checks, stencils
 
 ROLLING = ("field", "unit")
 CURVATURE = ("linear", "true")
+SHORTEST = 1e-60  # spacing whose fourth power, with stiffness and inertia, is a double by far
 FEWEST = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}
 WHY = {
     "springs": "a bend needs two neighbours",
@@ -181,6 +182,10 @@ class SteeredChain(Spaced):
 def _settle(chain: "Chain | SteeredChain", **ranges: tuple[int, bool]) -> None:
     """Check length, shift and the parameters per disc, link or bend (size, must be positive), and store them as arrays."""
     object.__setattr__(chain, "length", checks.number("length", chain.length, positive=True))
+    if not SHORTEST < chain.k < 1 / SHORTEST:
+        raise ValueError(
+            f"length makes the discs' spacing {chain.k:g}; it must be between {SHORTEST:g} and {1 / SHORTEST:g}: take other units"
+        )
     shift = checks.field("shift", chain.shift, 2)
     if chain.ends != "ring" and shift.any():
         raise ValueError(f"shift is the advance of r along a ring; with ends={chain.ends!r} it must be (0, 0)")

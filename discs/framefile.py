@@ -103,7 +103,7 @@ class FrameFile:
                     variable[(0,) * len(dims)] = np.nan
             marks = file.create_variable("checksum", ("time",), COUNT, data=np.zeros(sizes["time"], COUNT))
             marks.attrs["long_name"] = CHECKSUM
-            file.attrs.update(attrs)
+            file.attrs.update({key: archive.fixed(value) for key, value in attrs.items()})
         return cls(path, writable=True)
 
     @classmethod
@@ -155,8 +155,7 @@ class FrameFile:
         return self.frames
 
     def solution(self, problem: Problem | None = None) -> Solution:
-        """The frames that are there; ValueError if there are none, or fewer than a complete file has. A known `problem` is not
-        read."""
+        """The frames that are there; ValueError if there are none, or too few in a complete file. A known `problem` is not read."""
         count, missing = self.whole(), {}
         if count < self.frames:
             if self.attrs["complete"]:
@@ -208,9 +207,9 @@ class FrameFile:
 
         places = {}
         with h5py.File(self.path, "r") as file:
-            if file.attrs.get("format") != archive.FORMAT:
+            if "format" not in file.attrs or self._attribute(file, "format") != archive.FORMAT:
                 raise ValueError(f"its attribute 'format' is not {archive.FORMAT!r}")
-            self.attrs = {name: _plain(file.attrs[name]) for name in (*TEXTS, "complete", "checksum")}
+            self.attrs: dict[str, Any] = {name: self._attribute(file, name) for name in (*TEXTS, "complete", "checksum")}
             for name in (*QUANTITIES, *PARAMETERS, *COORDINATES, "checksum"):
                 if name not in file:
                     continue
@@ -221,6 +220,15 @@ class FrameFile:
                     raise ValueError(f"{name} is not stored as {need} in one piece")
                 places[name] = offset, found.shape
         return places
+
+    def _attribute(self, file: Any, name: str) -> str | int:
+        """An attribute that is a text of fixed length or a whole number. What it is is asked before it is read: in a changed file
+        texts of any length, which stand in a heap, can keep HDF5 busy for ever."""
+        kind = file.attrs.get_id(name)
+        if kind.shape not in ((), (1,)) or kind.dtype.kind not in "Si" or kind.dtype.itemsize > self._size:
+            raise ValueError(f"attribute {name!r} is not a text of fixed length or a whole number")
+        value = np.asarray(file.attrs[name]).item()
+        return value.decode() if isinstance(value, bytes) else value
 
     def _check(self) -> None:
         """Check shapes and header; sets `attrs` to what they say."""
@@ -243,15 +251,6 @@ class FrameFile:
 
 
 TEXTS: dict[str, Any] = {"problem": (dict, type(None)), "stats": dict, "error_estimate": (dict, type(None)), "versions": dict}
-
-
-def _plain(value: Any) -> Any:
-    """An attribute as text or a whole number."""
-    if isinstance(value, str):
-        return value
-    if np.size(value) == 1 and np.asarray(value).dtype.kind == "i":
-        return int(np.asarray(value).item())
-    raise ValueError(f"an attribute is {type(value).__name__}")
 
 
 def _line(error: BaseException) -> str:

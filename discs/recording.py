@@ -9,6 +9,7 @@ import signal
 import threading
 import time as clock
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs import archive
-from discs.framefile import FrameFile, fresh
+from discs.framefile import DAMAGE, FrameFile, fresh
 from discs.marching import March
 from discs.problem import Problem
 from discs.solution import Solution
@@ -170,9 +171,9 @@ class Recording(Rows):
 def read_restart(path: Path) -> dict[str, Any]:
     """What a restart file says, arrays by name; ValueError if it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as kept:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as kept:
             return {name: kept[name] for name in kept.files}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+    except (*DAMAGE, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
         raise ValueError(f"{_damaged(path)}: {error}") from None
 
 

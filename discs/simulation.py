@@ -121,16 +121,21 @@ def simulate(
             for taken in march.to(before[f]):
                 shown.update(taken)
                 record.pause(f, march)
-            frame = march.frame(after[f])
-            found = march.observe(frame)
-            if want:
-                found |= _extras(system, frame, want)
-            if offered:
-                found |= integrator.extras(system, march.memory, h)
-            record.write(f, found)
+            record.write(f, _observed(march, after[f], want, bool(offered)))  # not kept here: the next step needs the room
             record.pause(f + 1, march)
         seconds = record.seconds + clock.perf_counter() - started
         return record.solution(about | {"steps": march.step, **vars(march.work), "seconds": seconds})
+
+
+def _observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:
+    """What a frame a time tau after the last step records."""
+    frame = march.frame(tau)
+    found = march.observe(frame)
+    if want:
+        found |= _extras(march.system, frame, want)
+    if offered:
+        found |= march.integrator.extras(march.system, march.memory, march.h)
+    return found
 
 
 def _extras(system: RollingDiscs, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:

@@ -71,8 +71,8 @@ def slope_matrix(n: int, k: float, ends: str) -> sp.csr_array:
     mean = sp.diags_array([1.0, 1.0], offsets=[-1, 0], shape=(n, n - 1))
     more = [3.0, -3.0, 1.0] if ends == "consistent" else [2.0, -1.0]  # at an end, beside the one that is there
     m = len(more)
-    places = np.repeat([0, n - 1], m), np.concatenate([np.arange(m), n - 2 - np.arange(m)])
-    return sp.csr_array((mean + sp.coo_array((more + more, places), shape=(n, n - 1))) / (2 * k))
+    places = np.array([[0] * m + [n - 1] * m, [*range(m), *range(n - 2, n - 2 - m, -1)]], np.int32)
+    return sp.csr_array((mean + sp.coo_array((more + more, tuple(places)), shape=(n, n - 1))) / (2 * k))
 
 
 def bend_matrix(n: int, k: float, ends: str) -> sp.csr_array:

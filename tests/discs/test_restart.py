@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -138,11 +139,12 @@ def test_other_things_in_the_way(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="a checkpoint keeps one run"):
         simulate(problem, tol=1e-3, checkpoint=tmp_path / "run.nc")
     stopped(monkeypatch, 9, problem, **settled, checkpoint=tmp_path / "run.nc")
-    (tmp_path / "run.nc.restart").write_bytes(b"PK nonsense")
-    with pytest.raises(
-        ValueError, match=r"run\.nc\.restart is damaged; without it the run starts from the beginning, so delete it"
-    ):
-        simulate(problem, **settled, checkpoint=tmp_path / "run.nc")
+    good = (tmp_path / "run.nc.restart").read_bytes()
+    locked = re.sub(rb"(PK\x01\x02....)..", lambda found: found[1] + b"\x01\x00", good, flags=re.DOTALL)  # a password is asked for
+    for content in (b"PK nonsense", b"", good[: len(good) // 2], locked):
+        (tmp_path / "run.nc.restart").write_bytes(content)
+        with pytest.raises(ValueError, match=r"run\.nc\.restart is damaged; without it the run starts from the beginning, so"):
+            simulate(problem, **settled, checkpoint=tmp_path / "run.nc")
     (tmp_path / "run.nc.restart").unlink()
     equal(
         simulate(problem, **settled, checkpoint=tmp_path / "run.nc", progress=False), simulate(problem, **settled, progress=False)
