@@ -1,5 +1,6 @@
 """Chains and problems that the tests share: unequal, non-unit parameters, no symmetry."""
 
+import signal
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +8,9 @@ import pytest
 
 from continuum import solve, untwisting_rod
 from discs import Chain, Problem, State, SteeredChain
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job: tests send Ctrl-C, to themselves and to children
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class Model(NamedTuple):
