@@ -37,6 +37,6 @@ def test_import_brings_nothing_idle(package, idle):
 
 
 def test_import_of_discs_is_quick():
-    """0.6 to 0.9 s measured, most of it NumPy and SciPy's sparse matrices; seconds of the processor, the best of three, 1.5 allowed."""
+    """0.6 to 0.9 s measured, most of it NumPy and SciPy; seconds of the processor, the best of three, 1.5 allowed."""
     code = "import time; start = time.process_time(); import discs; print(time.process_time() - start)"
     assert min(float(ask(code)) for _ in range(3)) < 1.5
