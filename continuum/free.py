@@ -75,7 +75,7 @@ class FreeRod:
         self._mass, self._spin = chain.w * np.asarray(chain.density), chain.w * np.asarray(chain.spin_inertia)
         self._first, self._second = here, (here + 1) % n
         self._springs = LinearCurvature(chain)
-        bending, torsion = self._springs.hessians
+        bending, torsion = self._springs.hessians()
         order = folded(n) if chain.ends == "ring" else np.arange(n)
         # Newton's unknowns (x, y, mu), those of a node and its link beside each other
         bends, nodes = sp.coo_array(bending), np.arange(2 * n)

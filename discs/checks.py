@@ -35,17 +35,17 @@ def number(name: str, value: object, *, positive: bool = False) -> float:
 
 
 def field(name: str, value: ArrayLike, size: int, *, least: float | None = None, strict: bool = False) -> NDArray:
-    """Return `value` as a read-only float array (size,), a number standing for all of them.
+    """Return `value` as a read-only float array (size,), a number standing for all of them and stored once.
 
     With `least`, every entry must be at least that, or larger if `strict`.
     """
     try:
-        given = np.asarray(value, dtype=float)
+        given = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number or {size} numbers; got {value!r}") from None
     if given.shape not in ((), (size,)):
         raise ValueError(f"{name} must be a number or an array of shape ({size},); got shape {given.shape}")
-    given = np.broadcast_to(given, (size,)).copy()
+    given = np.broadcast_to(given, (size,))
     bad = ~np.isfinite(given)
     need = "finite"
     if least is not None:
@@ -54,7 +54,6 @@ def field(name: str, value: ArrayLike, size: int, *, least: float | None = None,
     if bad.any():
         i = int(np.argmax(bad))
         raise ValueError(f"{name} must be {need}; got {given[i]} at place {i}")
-    given.flags.writeable = False
     return given
 
 

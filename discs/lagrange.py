@@ -3,9 +3,8 @@
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from discs.mechanics import MechanicalSystem
 from discs.problem import Problem
@@ -28,14 +27,14 @@ def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
     # row pairs r. - e theta.: entries 1 at x, y and -e at theta of the same disc
     columns = np.stack([np.concatenate([discs, discs + n]), np.tile(discs + 2 * n, 2)], axis=1).ravel()
     starts = np.arange(0, 4 * n + 1, 2)
-    inertia = sp.diags_array(system.weights.ravel(), format="csr")
+    inertia = scipy.sparse.diags_array(system.weights.ravel(), format="csr")
 
     def shape(q: NDArray) -> Any:
         return system.shape(q.reshape(rows, n))
 
-    def entries(diagonal: float, e: NDArray) -> sp.csr_array:
+    def entries(diagonal: float, e: NDArray) -> "scipy.sparse.csr_array":
         data = np.stack([np.full(2 * n, diagonal), -e.ravel()], axis=1).ravel()
-        return sp.csr_array((data, columns, starts), shape=(2 * n, m))
+        return scipy.sparse.csr_array((data, columns, starts), shape=(2 * n, m))
 
     moves, pieces = _moves(problem), _pieces(problem)
 
@@ -71,8 +70,8 @@ def _pieces(problem: Problem) -> NDArray:
     """Pieces of the chain that torsion springs join, (pieces, n), one or zero."""
     n = problem.chain.n
     first = np.flatnonzero(problem.chain.torsion_stiffness)
-    links = sp.coo_array((np.ones(first.size), (first, (first + 1) % n)), shape=(n, n))
-    count, piece = connected_components(links, directed=False)
+    links = scipy.sparse.coo_array((np.ones(first.size), (first, (first + 1) % n)), shape=(n, n))
+    count, piece = scipy.sparse.csgraph.connected_components(links, directed=False)
     return (piece == np.arange(count)[:, None]).astype(float)
 
 

@@ -26,13 +26,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy  # its integrate, slow to import, when it is used
-import scipy.linalg as la
-import scipy.sparse as sp
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu, spsolve
 
 from discs import checks
 
@@ -138,15 +133,17 @@ class MechanicalSystem:
 
     def also(self, rows: ArrayLike, owners: Sequence[str], drive: ArrayLike = 0.0) -> "MechanicalSystem":
         """The system with more constraints, constant rows (k, m) with rows @ v = drive: a disc that is held, a motor."""
-        extra = sp.csr_array(np.atleast_2d(np.asarray(rows, dtype=float)))
+        extra = scipy.sparse.csr_array(np.atleast_2d(np.asarray(rows, dtype=float)))
         if extra.shape != (len(owners), len(self.names)):
             raise ValueError(f"rows must have shape ({len(owners)}, {len(self.names)}), one row per owner; got {extra.shape}")
-        none = sp.csr_array(extra.shape)
+        none = scipy.sparse.csr_array(extra.shape)
         return replace(
             self,
             owners=(*self.owners, *owners),
-            constraint=lambda q: sp.vstack([sp.csr_array(self.constraint(q)), extra], format="csr"),
-            constraint_rate=lambda q, v: sp.vstack([sp.csr_array(self.constraint_rate(q, v)), none], format="csr"),
+            constraint=lambda q: scipy.sparse.vstack([scipy.sparse.csr_array(self.constraint(q)), extra], format="csr"),
+            constraint_rate=lambda q, v: scipy.sparse.vstack(
+                [scipy.sparse.csr_array(self.constraint_rate(q, v)), none], format="csr"
+            ),
             drive=np.concatenate([self.drive, checks.field("drive", drive, len(owners))]),
         )
 
@@ -155,13 +152,13 @@ class MechanicalSystem:
     def saddle_point(self, q: NDArray) -> Any:
         """The matrix [[M, A^T], [A, 0]], (m + c, m + c), sparse if A is."""
         m, a = self.mass(q), self.constraint(q)
-        if not sp.issparse(a):
+        if not scipy.sparse.issparse(a):
             return np.block([[m, a.T], [a, np.zeros((len(a), len(a)))]])
-        m, a = sp.coo_array(m), sp.coo_array(a)
+        m, a = scipy.sparse.coo_array(m), scipy.sparse.coo_array(a)
         row, column = a.coords[0] + m.shape[0], a.coords[1]
         places = np.concatenate([m.coords[0], row, column]), np.concatenate([m.coords[1], column, row])
         size = m.shape[0] + a.shape[0]
-        return sp.csc_array(sp.coo_array((np.concatenate([m.data, a.data, a.data]), places), shape=(size, size)))
+        return scipy.sparse.coo_array((np.concatenate([m.data, a.data, a.data]), places), shape=(size, size)).tocsc()
 
     def _solve(self, q: NDArray, f: NDArray, g: NDArray) -> Motion:
         """u and lambda with M u = f + A^T lambda, A u = g."""
@@ -173,8 +170,8 @@ class MechanicalSystem:
 
     def _explain(self, q: NDArray, g: NDArray) -> None:
         """Raise ValueError with what makes the saddle point singular, part by part of constraints that share coordinates."""
-        a = sp.csr_array(self.constraint(q))
-        parts, part = connected_components(abs(a) @ abs(a).T, directed=False)
+        a = scipy.sparse.csr_array(self.constraint(q))
+        parts, part = scipy.sparse.csgraph.connected_components(abs(a) @ abs(a).T, directed=False)
         for p in range(parts):
             rows = np.flatnonzero(part == p)
             block = a[rows].toarray()
@@ -190,7 +187,7 @@ class MechanicalSystem:
                 f"constraints of {owners} are redundant: {len(rows)} rows of rank {rank}, so that multipliers are not determined; "
                 f"take {len(rows) - rank} away"
             )
-        kernel = la.null_space(a.toarray())
+        kernel = scipy.linalg.null_space(a.toarray())
         inertia = kernel.T @ (self.mass(q) @ kernel)
         sizes, directions = np.linalg.eigh(inertia)
         if sizes[0] <= SINGULAR * sizes[-1]:
@@ -222,13 +219,13 @@ class MechanicalSystem:
     def reduced(self, q: ArrayLike, v: ArrayLike) -> Motion:
         """The same accelerations and multipliers from the reduced form, dense: for small systems and for teaching."""
         q, v = self._vectors(q, v)
-        m, a, f = self.mass(q), sp.csc_array(self.constraint(q)), self.force(q, v)
-        square = sp.csc_array(a @ a.T)
-        w = a.T @ spsolve(square, -(self.constraint_rate(q, v) @ v))
-        b = la.null_space(a.toarray())
+        m, a, f = self.mass(q), scipy.sparse.csc_array(self.constraint(q)), self.force(q, v)
+        square = scipy.sparse.csc_array(a @ a.T)
+        w = a.T @ scipy.sparse.linalg.spsolve(square, -(self.constraint_rate(q, v) @ v))
+        b = scipy.linalg.null_space(a.toarray())
         u = np.linalg.solve(b.T @ (m @ b), b.T @ (f - m @ w))
         acceleration = w + b @ u
-        return Motion(acceleration, np.atleast_1d(spsolve(square, a @ (m @ acceleration - f))))
+        return Motion(acceleration, np.atleast_1d(scipy.sparse.linalg.spsolve(square, a @ (m @ acceleration - f))))
 
     def residual(self, q: ArrayLike, v: ArrayLike) -> NDArray:
         """A v - b, (c,)."""
@@ -290,11 +287,11 @@ class MechanicalSystem:
 
 def _factors(matrix: Any) -> tuple[NDArray, Callable[[NDArray], NDArray]]:
     """Pivots of a matrix, in size, and what solves with it."""
-    if sp.issparse(matrix):
+    if scipy.sparse.issparse(matrix):
         try:
-            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A")
+            factors = scipy.sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A")
         except RuntimeError:  # a pivot is zero exactly
             return np.zeros(1), lambda right: np.full_like(right, np.nan)
         return np.abs(factors.U.diagonal()), factors.solve
-    lu, exchanges, _ = dgetrf(matrix)
-    return np.abs(np.diag(lu)), lambda right: dgetrs(lu, exchanges, right)[0]
+    lu, exchanges, _ = scipy.linalg.lapack.dgetrf(matrix)
+    return np.abs(np.diag(lu)), lambda right: scipy.linalg.lapack.dgetrs(lu, exchanges, right)[0]

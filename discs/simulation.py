@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm
 
 from discs import checks
 from discs.integrators import Integrator, find
@@ -170,6 +169,8 @@ class Progress:
         if self._bar is not None:
             self._bar.update(steps)
         elif self._shown and clock.perf_counter() - self._started > 1:
+            from tqdm import tqdm
+
             self._bar = tqdm(total=self._total, initial=self._done, desc=self._name, unit="step")
 
 

@@ -17,7 +17,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from discs import stencils
@@ -46,8 +45,7 @@ class SlavedSystem(RollingDiscs):
         inertia = np.asarray(chain.spin_inertia) + np.asarray(chain.density) * self._radius**2
         point = np.max(self._radius**2 / np.maximum(inertia, 1e-300))
         self.stiffest = 4 * float(np.max(chain.bending_stiffness) * point) / chain.k**4
-        slope = stencils.slope_matrix(n, chain.k, ends)
-        self._slope = sp.csr_array(sp.block_diag([slope, slope]))
+        self._slope = stencils.slope_matrix(n, chain.k, ends)
 
     # Kinematics
 
@@ -63,7 +61,7 @@ class SlavedSystem(RollingDiscs):
         return shape + stencils.links(dq, self._ends)
 
     def slope(self, shape: NDArray) -> NDArray:
-        return (self._slope @ shape[:2].ravel()).reshape(2, -1)
+        return np.array([self._slope @ d for d in shape[:2]])
 
     def contact(self, shape: NDArray) -> NDArray:
         slope = self.slope(shape)
@@ -141,4 +139,4 @@ class SlavedSystem(RollingDiscs):
             return None
         from discs.kernels import slaved  # numba is slow to import
 
-        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs.hessians)
+        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs.hessians())

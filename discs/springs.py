@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
 from discs import stencils
@@ -31,11 +31,8 @@ class LinearCurvature:
 
     def __init__(self, chain: Chain) -> None:
         self._n, self._ends = chain.n, chain.ends
-        bend = stencils.bend_matrix(chain.n, chain.k, chain.ends)
-        stiffness = np.asarray(chain.bending_stiffness) * chain.bend_shares
-        self._bend = sp.csr_array(sp.block_diag([bend, bend]))
-        self._bending = np.tile(stiffness, 2)
-        self._tension = sp.csr_array(self._bend.T @ sp.diags_array(self._bending) @ self._bend)
+        self._bend = stencils.bend_matrix(chain.n, chain.k, chain.ends)
+        self._bending = np.asarray(chain.bending_stiffness) * chain.bend_shares
         self._torsion = np.asarray(chain.torsion_stiffness) / chain.k
         self._order = folded(chain.n) if chain.ends == "ring" else None
 
@@ -44,17 +41,23 @@ class LinearCurvature:
 
     def polarised(self, d: NDArray, other: NDArray) -> float:
         """The symmetric bilinear form of which V is the square."""
-        bends = self._bend @ d[:2].ravel(), self._bend @ other[:2].ravel()
-        return 0.5 * float((self._bending * bends[0]) @ bends[1] + self._torsion * d[2] @ other[2])
+        bending = sum((self._bending * (self._bend @ d[row])) @ (self._bend @ other[row]) for row in range(2))
+        return 0.5 * float(bending + self._torsion * d[2] @ other[2])
 
     def secant(self, d: NDArray, change: NDArray) -> NDArray:
         return d + 0.5 * change
 
     def tension(self, secant: NDArray) -> NDArray:
         tension = np.empty_like(secant)
-        tension[:2] = (self._tension @ secant[:2].ravel()).reshape(2, -1)
+        for row in range(2):
+            tension[row] = self._tension @ secant[row]
         tension[2] = self._torsion * secant[2]
         return tension
+
+    @cached_property
+    def _tension(self) -> "scipy.sparse.csr_array":
+        """The Hessian of V by the links of x or y, (n_links, n_links); kept only where steps are not compiled."""
+        return _elastic(self._bend, self._bending)
 
     def stiffness(self, secant: NDArray, c: NDArray) -> NDArray:
         if self._order is not None:
@@ -65,17 +68,15 @@ class LinearCurvature:
             matrix[width - j, j:] = (band[:, j:] * c[:, j:] * c[:, : n - j]).sum(axis=0)
         return matrix
 
-    @cached_property
-    def hessians(self) -> tuple[sp.csr_array, sp.csr_array]:
+    def hessians(self) -> "tuple[scipy.sparse.csr_array, scipy.sparse.csr_array]":
         """grad^2 V by x or y, and by theta, (n, n)."""
         link = stencils.link_matrix(self._n, self._ends)
-        tension = self._tension[: link.shape[0], : link.shape[0]]
-        return sp.csr_array(link.T @ tension @ link), sp.csr_array(link.T @ sp.diags_array(self._torsion) @ link)
+        return _elastic(self._bend @ link, self._bending), _elastic(link, self._torsion)
 
     @cached_property
     def _bands(self) -> NDArray:
         """grad^2 V, (width + 1, 3, n) in the system's order: [j, :, i] couples discs i - j and i."""
-        n, hessians = self._n, self.hessians
+        n, hessians = self._n, self.hessians()
         if self._order is not None:
             hessians = hessians[0][self._order][:, self._order], hessians[1][self._order][:, self._order]
         # nonzero() leaves out springs of no stiffness, and the bands they would fill
@@ -85,6 +86,11 @@ class LinearCurvature:
             band[:2, j:] = hessians[0].diagonal(j)
             band[2, j:] = hessians[1].diagonal(j)
         return bands
+
+
+def _elastic(strain: "scipy.sparse.csr_array", stiffness: NDArray) -> "scipy.sparse.csr_array":
+    """B^T (stiffness) B of the strains B, (springs, unknowns)."""
+    return scipy.sparse.csr_array(strain.T @ scipy.sparse.diags_array(stiffness) @ strain)
 
 
 class Line(NamedTuple):

@@ -9,7 +9,7 @@ Kinds of ends: "springs" (plain), "paper" (the same springs; the end discs weigh
 """
 
 import numpy as np
-import scipy.sparse as sp
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
 ENDS = ("springs", "consistent", "paper", "ring")
@@ -50,14 +50,14 @@ def pull(tension: NDArray, ends: str) -> NDArray:
     return force
 
 
-def link_matrix(n: int, ends: str) -> sp.csr_array:
+def link_matrix(n: int, ends: str) -> "scipy.sparse.csr_array":
     """`links` as a matrix, (n_links, n)."""
     if ends == "ring":
-        return sp.csr_array(sp.diags_array([-1.0, 1.0, 1.0], offsets=[0, 1, 1 - n], shape=(n, n)))
-    return sp.csr_array(sp.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(n - 1, n)))
+        return scipy.sparse.diags_array([-1.0, 1.0, 1.0], offsets=[0, 1, 1 - n], shape=(n, n), format="csr")
+    return scipy.sparse.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(n - 1, n), format="csr")
 
 
-def slope_matrix(n: int, k: float, ends: str) -> sp.csr_array:
+def slope_matrix(n: int, k: float, ends: str) -> "scipy.sparse.csr_array":
     """Headings r' at the discs from the links, (n, n_links).
 
     Inside r'_i = (r_{i+1} - r_{i-1})/2k. At an end
@@ -66,30 +66,30 @@ def slope_matrix(n: int, k: float, ends: str) -> sp.csr_array:
     whose truncation error k**2 r'''/6 is the inner one.
     """
     if ends == "ring":
-        mean = sp.diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, n - 1], shape=(n, n))
-        return sp.csr_array(mean / (2 * k))
-    mean = sp.diags_array([1.0, 1.0], offsets=[-1, 0], shape=(n, n - 1))
+        mean = scipy.sparse.diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, n - 1], shape=(n, n))
+        return scipy.sparse.csr_array(mean / (2 * k))
+    mean = scipy.sparse.diags_array([1.0, 1.0], offsets=[-1, 0], shape=(n, n - 1))
     more = [3.0, -3.0, 1.0] if ends == "consistent" else [2.0, -1.0]  # at an end, beside the one that is there
     m = len(more)
     places = np.array([[0] * m + [n - 1] * m, [*range(m), *range(n - 2, n - 2 - m, -1)]], np.int32)
-    return sp.csr_array((mean + sp.coo_array((more + more, tuple(places)), shape=(n, n - 1))) / (2 * k))
+    return scipy.sparse.csr_array((mean + scipy.sparse.coo_array((more + more, tuple(places)), shape=(n, n - 1))) / (2 * k))
 
 
-def bend_matrix(n: int, k: float, ends: str) -> sp.csr_array:
+def bend_matrix(n: int, k: float, ends: str) -> "scipy.sparse.csr_array":
     """Curvature vectors r'' at the bends from the links, (n_bends, n_links); a bend is a disc that has a bending spring.
 
     Inside r''_i = (r_{i+1} - 2 r_i + r_{i-1})/k**2. With "consistent" ends the end discs are bends too, with the same
     ghost as the heading: r''_0 = (2 r_0 - 5 r_1 + 4 r_2 - r_3)/k**2.
     """
     if ends == "ring":
-        jump = sp.diags_array([-1.0, 1.0, -1.0], offsets=[-1, 0, n - 1], shape=(n, n))
-        return sp.csr_array(jump / k**2)
-    jump = sp.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(n - 2, n - 1))
+        jump = scipy.sparse.diags_array([-1.0, 1.0, -1.0], offsets=[-1, 0, n - 1], shape=(n, n))
+        return scipy.sparse.csr_array(jump / k**2)
+    jump = scipy.sparse.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(n - 2, n - 1))
     if ends == "consistent":
-        first = sp.coo_array(([-2.0, 3.0, -1.0], ([0, 0, 0], [0, 1, 2])), shape=(1, n - 1))
-        last = sp.coo_array(([2.0, -3.0, 1.0], ([0, 0, 0], [n - 2, n - 3, n - 4])), shape=(1, n - 1))
-        jump = sp.vstack([first, jump, last])
-    return sp.csr_array(jump / k**2)
+        first = scipy.sparse.coo_array(([-2.0, 3.0, -1.0], ([0, 0, 0], [0, 1, 2])), shape=(1, n - 1))
+        last = scipy.sparse.coo_array(([2.0, -3.0, 1.0], ([0, 0, 0], [n - 2, n - 3, n - 4])), shape=(1, n - 1))
+        jump = scipy.sparse.vstack([first, jump, last])
+    return scipy.sparse.csr_array(jump / k**2)
 
 
 def bend_shares(n: int, k: float, ends: str) -> NDArray:

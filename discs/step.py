@@ -1,8 +1,8 @@
 """A step to begin with."""
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from discs.integrators import Integrator, find
 from discs.problem import Problem
@@ -46,5 +46,5 @@ def _stiffest(problem: Problem) -> float:
     if n < 40:
         return float(np.linalg.eigvalsh(np.array([apply(row) for row in np.eye(n)])).max())
     start = np.random.default_rng(0).standard_normal(n)
-    operator = LinearOperator((n, n), matvec=apply, dtype=float)
-    return float(eigsh(operator, k=1, which="LA", v0=start, tol=1e-3, return_eigenvectors=False)[0])
+    operator = scipy.sparse.linalg.LinearOperator((n, n), matvec=apply, dtype=float)
+    return float(scipy.sparse.linalg.eigsh(operator, k=1, which="LA", v0=start, tol=1e-3, return_eigenvectors=False)[0])

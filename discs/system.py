@@ -17,8 +17,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpbsv, zgbsv
 
 
 class Phase(NamedTuple):
@@ -210,9 +210,9 @@ class RollingDiscs(SkewGradient):
             full = np.zeros((3 * width + 1, n), complex, order="F")  # `width` more rows above for the exchange of pivots
             for j in range(width + 1):
                 full[2 * width - j, j:] = full[2 * width + j, : n - j] = matrix[width - j, j:]
-            _, _, p, info = zgbsv(width, width, full, flat, overwrite_ab=True)
+            _, _, p, info = scipy.linalg.lapack.zgbsv(width, width, full, flat, overwrite_ab=True)
         else:
-            _, p, info = dpbsv(matrix, flat, overwrite_ab=True)
+            _, p, info = scipy.linalg.lapack.dpbsv(matrix, flat, overwrite_ab=True)
         if info:
             p = np.full(flat.size, np.nan)  # not positive definite: C is not finite, or all digits are lost
         if self._inverse_order is not None:

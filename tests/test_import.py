@@ -27,7 +27,7 @@ def ask(code: str) -> str:
 @pytest.mark.parametrize(
     ("package", "idle"),
     [
-        ("discs", [*IDLE, "scipy.integrate", "scipy.interpolate", "scipy.optimize"]),
+        ("discs", [*IDLE, "scipy.linalg", "scipy.sparse", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "tqdm"]),
         ("continuum", IDLE),
         ("compare", ["exudyn", "jax", "mujoco", "numba", "sksundae", "sympy", "xarray"]),  # pictures are its work
     ],
@@ -37,6 +37,6 @@ def test_import_brings_nothing_idle(package, idle):
 
 
 def test_import_of_discs_is_quick():
-    """0.6 to 0.9 s measured, most of it NumPy and SciPy; seconds of the processor, the best of three, 1.5 allowed."""
+    """0.2 s by itself, most of it NumPy, and 0.4 s on a crowded machine; seconds of the processor, the best of three, 0.75 allowed."""
     code = "import time; start = time.process_time(); import discs; print(time.process_time() - start)"
-    assert min(float(ask(code)) for _ in range(3)) < 1.5
+    assert min(float(ask(code)) for _ in range(3)) < 0.75

@@ -87,7 +87,7 @@ def _build(mbs: Any, problem: Problem) -> float:
     n, q0 = system.n, z.hi
     v0 = system.forward(system.frame(system.shape(q0)), z.pi)
     at_origin = system.shape(np.zeros_like(q0))  # not zero if the chain closes up to a shift
-    along, roll = system._springs.hessians
+    along, roll = system._springs.hessians()
     by_disc = np.arange(3 * n).reshape(3, n).T.ravel()
     stiffness = sp.csr_array(sp.block_diag([along, along, roll]))[by_disc][:, by_disc]
     slope = sp.csr_array(stencils.slope_matrix(n, chain.k, chain.ends) @ stencils.link_matrix(n, chain.ends))

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy  # its integrate, slow to import, when it is used
-import scipy.sparse as sp
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
 from discs import checks
@@ -56,14 +55,14 @@ class Reduced:
         """Half the bandwidth of the Jacobian of f, of an open chain."""
         return (self.system.reach + 1) * (2 * self.rows - 2) - 1
 
-    def sparsity(self) -> sp.csc_array:
+    def sparsity(self) -> "scipy.sparse.csc_array":
         """Where the Jacobian of f may differ from zero."""
         n, reach = self.n, self.system.reach
         offsets = [j for j in range(-reach, reach + 1) if abs(j) < n]
         if self.system.closed:
             offsets += [j + side * n for j in range(-reach, reach + 1) for side in (-1, 1) if 0 < abs(j + side * n) < n]
-        near = sp.diags_array(np.ones((len(set(offsets)), 1)), offsets=sorted(set(offsets)), shape=(n, n))
-        return sp.csc_array(sp.kron(near, np.ones((2 * self.rows - 2, 2 * self.rows - 2))))
+        near = scipy.sparse.diags_array(np.ones((len(set(offsets)), 1)), offsets=sorted(set(offsets)), shape=(n, n))
+        return scipy.sparse.csc_array(scipy.sparse.kron(near, np.ones((2 * self.rows - 2, 2 * self.rows - 2))))
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import scipy  # its integrate, slow to import, when it is used
-import scipy.sparse as sp
+import scipy  # its parts, slow to import, when they are used
 
 PARTS = ("data", "indices", "indptr")
 
@@ -23,7 +22,7 @@ class Factors:
     make : matrix -> factors, as SciPy's solvers make them.
     """
 
-    def __init__(self, matrix: sp.csc_matrix, make: Callable[[sp.csc_matrix], Any]) -> None:
+    def __init__(self, matrix: "scipy.sparse.csc_matrix", make: Callable[["scipy.sparse.csc_matrix"], Any]) -> None:
         self.matrix, self._factors = matrix, make(matrix)
 
     def solve(self, b: np.ndarray) -> np.ndarray:
@@ -43,7 +42,7 @@ def keep(solver: "scipy.integrate.OdeSolver") -> dict[str, Any]:
     kept = _numbers(vars(solver))
     for name, value in vars(solver).items():
         matrix = value.matrix if isinstance(value, Factors) else value
-        if sp.issparse(matrix) and name != "I":
+        if scipy.sparse.issparse(matrix) and name != "I":
             kept |= {f"{name}.{part}": getattr(matrix, part).copy() for part in PARTS}
     return kept
 
@@ -62,7 +61,7 @@ def recall(solver: "scipy.integrate.OdeSolver", kept: dict[str, Any]) -> None:
         for name in ("rwork", "iwork", "state_doubles", "state_ints"):
             getattr(inner, name)[...] = kept.pop(name)
     for name in {name.split(".")[0] for name in kept if "." in name}:
-        matrix = sp.csc_matrix(tuple(kept.pop(f"{name}.{part}") for part in PARTS), shape=(solver.n, solver.n))
+        matrix = scipy.sparse.csc_matrix(tuple(kept.pop(f"{name}.{part}") for part in PARTS), shape=(solver.n, solver.n))
         setattr(solver, name, solver.lu(matrix) if name.startswith("LU") else matrix)
     for name, value in kept.items():  # last, so that counts of work are right
         now = getattr(solver, name)

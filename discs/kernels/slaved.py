@@ -48,8 +48,10 @@ def parameters(given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, h
     bend[(n - stiffness.size) // 2 :][: stiffness.size] = stiffness
     torsion[1 : n + ring] = np.asarray(given.torsion_stiffness) / k
     torsion[0] = torsion[n]
-    here = np.arange(n)
-    hessian, twist = ([matrix[here, (here + j) % n] for j in range(3)] for matrix in hessians)
+    hessian, twist = (
+        np.array([np.append(matrix.diagonal(j), matrix.diagonal(j - n)) for j in range(width)])  # i with i + j, around a ring
+        for matrix, width in zip(hessians, (3, 2), strict=True)
+    )
     corner = np.zeros(2)
     if given.ends == "consistent":
         corner[:] = hessians[0][0, 3], hessians[0][n - 4, n - 1] if n > 4 else 0.0
@@ -58,9 +60,9 @@ def parameters(given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, h
         weights=weights,
         bend=bend,
         torsion=torsion,
-        hessian=np.array(hessian),
+        hessian=hessian,
         corner=corner,
-        twist=np.array(twist[:2]),
+        twist=twist,
         scale=scale,
         shift=shift,
         k=k,
