@@ -35,7 +35,7 @@ from continuum.bases import polynomials, waves
 from continuum.rod import Scene
 from discs import Gauss8, SimulationError, Solution
 from discs.integrators.base import Work
-from discs.simulation import schedule
+from discs.simulation import steps_before
 from discs.system import Phase, SkewGradient
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259)  # functions; odd, as a series has one more cosine than sines
@@ -215,10 +215,10 @@ class Course:
         rod = SpectralRod(self._scene, n)
         h, z, work = self._scene.duration / steps, rod.start(self._scene), Work()
         bound = 10 * rod.energy(z)
-        before, after = schedule(self._times, h)
         rows: dict[str, list] = {}
         done = 0
-        for last, rest in zip(before, after, strict=True):
+        for time in self._times.tolist():
+            last, rest = steps_before(time, h)
             for step in range(done + 1, last + 1):
                 z = self._method.step(rod, z, h, work)
                 self._check(rod, z, work, step, h, bound)

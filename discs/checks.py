@@ -1,5 +1,6 @@
 """Refusing bad input: what is required, what was given, what to do."""
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -29,7 +30,7 @@ def number(name: str, value: object, *, positive: bool = False) -> float:
         given = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be {need}; got {value!r}") from None
-    if isinstance(value, (bool, str)) or not np.isfinite(given) or (positive and given <= 0):
+    if isinstance(value, (bool, str)) or not math.isfinite(given) or (positive and given <= 0):
         raise ValueError(f"{name} must be {need}; got {value!r}")
     return given
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from discs.chain import Chain
 from discs.integrators import Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
@@ -50,26 +49,6 @@ def _warn_of_lost_digits(system: RollingDiscs, h: float) -> None:
         )
 
 
-def _warn_of_ill_posed(problem: Problem) -> None:
-    """Warn where discs without bending stiffness roll, or will, under the field law.
-
-    With K = 0 the straight rod rolling at the rate omega amplifies waves of length 2 pi/q at the rate sigma = u q, where
-    M u^4 + (beta - alpha R^2 omega^2) u^2 = beta R^2 omega^2 (docs/model.md): a Hadamard instability. Discs of spacing k cut it off
-    at sigma <= R omega/k, so runs with more discs do not converge to anything.
-    """
-    chain = problem.chain
-    limp = isinstance(chain, Chain) and chain.rolling == "field" and not np.any(chain.bending_stiffness)
-    if limp and np.any(chain.radius) and problem.energy() > 0:  # what has no energy never moves
-        rate = np.max(np.asarray(chain.radius) * np.abs(problem.initial.omega)) / chain.k
-        now = f", at the start up to {rate:.3g} per unit of time" if rate > 0 else ""
-        warnings.warn(
-            "bending_stiffness is 0 under rolling='field': the equations of a rolling rod are ill posed, short waves grow at rates "
-            f"proportional to the number of discs{now}, and there is no limit of many discs; take bending_stiffness > 0 or "
-            "rolling='unit'",
-            stacklevel=4,
-        )
-
-
 class March:
     """A run on its way.
 
@@ -93,7 +72,8 @@ class March:
         self.compiled = self.kernel is not None and not integrator.adaptive
         self.chunk = max(1, CHUNK // self.system.n)
         self.bound = problem.blown_up
-        _warn_of_ill_posed(problem)
+        if problem.ill_posed:
+            warnings.warn(problem.ill_posed, stacklevel=3)
         if integrator.stability_limit == np.inf and not integrator.adaptive:
             _warn_of_lost_digits(self.system, h)
         self.memory: Any = integrator.begin(self.system, problem.start(), h, self.work, self.kernel)

@@ -123,6 +123,26 @@ class Problem:
         chain = self.chain
         return 10 * self.energy() + 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
 
+    @cached_property
+    def ill_posed(self) -> str:
+        """What to warn of where discs without bending stiffness roll, or will, under the field law; empty where all is well.
+
+        With K = 0 the straight rod rolling at the rate omega amplifies waves of length 2 pi/q at the rate sigma = u q, where
+        M u^4 + (beta - alpha R^2 omega^2) u^2 = beta R^2 omega^2 (docs/model.md): a Hadamard instability. Discs of spacing k cut it
+        off at sigma <= R omega/k, so runs with more discs do not converge to anything.
+        """
+        chain = self.chain
+        limp = isinstance(chain, Chain) and chain.rolling == "field" and not np.any(chain.bending_stiffness)
+        if not limp or not np.any(chain.radius) or self.energy() <= 0:  # what has no energy never moves
+            return ""
+        rate = np.max(np.asarray(chain.radius) * np.abs(self.initial.omega)) / chain.k
+        now = f", at the start up to {rate:.3g} per unit of time" if rate > 0 else ""
+        return (
+            "bending_stiffness is 0 under rolling='field': the equations of a rolling rod are ill posed, short waves grow at rates "
+            f"proportional to the number of discs{now}, and there is no limit of many discs; take bending_stiffness > 0 or "
+            "rolling='unit'"
+        )
+
     def energy(self, state: State | None = None) -> float:
         """Kinetic and potential energy of a state, the initial one by default."""
         return self._energy if state is None else Problem(self.chain, state, self.duration)._energy

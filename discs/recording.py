@@ -48,9 +48,9 @@ class Rows:
 
     def write(self, f: int, found: dict[str, Any]) -> None:
         """Take frame f."""
+        if not self.rows:
+            self.rows = {name: np.empty((self.times.size, *getattr(value, "shape", ()))) for name, value in found.items()}
         for name, value in found.items():
-            if name not in self.rows:
-                self.rows[name] = np.empty((self.times.size, *np.shape(value)))
             self.rows[name][f] = value
 
     def pause(self, f: int, march: March) -> None:

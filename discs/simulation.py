@@ -86,15 +86,13 @@ def simulate(
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     times = frame_times(frames, problem.duration)
-    if times[-1] / h > MOST_STEPS:
-        raise ValueError(
-            f"dt = {h:g} makes {times[-1] / h:.1g} steps to t = {times[-1]:g}, more than can be counted: take a larger dt"
-        )
+    end = float(times[-1])
+    if end / h > MOST_STEPS:
+        raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")
     system = problem.system
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
-    before, after = schedule(times, h)
     about = {
         "method": integrator.name,
         "order": integrator.order,
@@ -108,7 +106,7 @@ def simulate(
     started = clock.perf_counter()
     with (
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),
-        Progress(integrator.name, before[-1], progress) as shown,
+        Progress(integrator.name, steps_before(end, h)[0], progress) as shown,
         record,
     ):
         if record.complete:
@@ -117,10 +115,11 @@ def simulate(
         first = record.begin(march)
         shown.update(march.step)
         for f in range(first, times.size):
-            for taken in march.to(before[f]):
+            before, rest = steps_before(float(times[f]), h)
+            for taken in march.to(before):
                 shown.update(taken)
                 record.pause(f, march)
-            record.write(f, _observed(march, after[f], want, bool(offered)))  # not kept here: the next step needs the room
+            record.write(f, _observed(march, rest, want, bool(offered)))  # not kept here: the next step needs the room
             record.pause(f + 1, march)
         seconds = record.seconds + clock.perf_counter() - started
         return record.solution(about | {"steps": march.step, **vars(march.work), "seconds": seconds})
@@ -154,7 +153,7 @@ class Progress:
     """A progress bar that is made only when a run has lasted a second: making one costs as much as a short run."""
 
     def __init__(self, name: str, total: int, shown: bool) -> None:
-        self._name, self._total, self._shown = name, int(total), shown
+        self._name, self._total, self._shown = name, total, shown
         self._done, self._started, self._bar = 0, clock.perf_counter(), None
 
     def __enter__(self) -> "Progress":
@@ -181,11 +180,11 @@ def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:
     return tuple(checks.choice("want", name, (*WANTS, *integrator.offers)) for name in given)
 
 
-def schedule(times: NDArray, h: float) -> tuple[NDArray, NDArray]:
-    """Whole steps before each frame, and the rest of the way; a frame within rounding of a step is taken at the step."""
-    before = np.floor(times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
-    rest = times - before * h
-    return before, np.where(rest > 1e-9 * h, rest, 0.0)
+def steps_before(time: float, h: float) -> tuple[int, float]:
+    """Whole steps before a time, and the rest of the way; a time within rounding of a step is taken at the step."""
+    steps = int(time / h * (1 + 4e-16) + 1e-9)
+    rest = time - steps * h
+    return steps, rest if rest > 1e-9 * h else 0.0
 
 
 def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:

@@ -37,6 +37,6 @@ def test_import_brings_nothing_idle(package, idle):
 
 
 def test_import_of_discs_is_quick():
-    """0.2 s by itself, most of it NumPy, and 0.4 s on a crowded machine; seconds of the processor, the best of three, 0.75 allowed."""
+    """0.2 s alone, most of it NumPy, 0.4 s on a crowded machine; seconds of the processor, the best of three, 0.75 allowed."""
     code = "import time; start = time.process_time(); import discs; print(time.process_time() - start)"
     assert min(float(ask(code)) for _ in range(3)) < 0.75

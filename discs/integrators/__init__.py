@@ -1,5 +1,7 @@
 """The integrators, by name."""
 
+from functools import cache
+
 from discs import checks
 from discs.integrators.base import Integrator, OneStep, Work
 from discs.integrators.composition import KahanLi6, Suzuki4
@@ -19,7 +21,13 @@ def find(method: str | Integrator) -> Integrator:
     """The integrator of a name, with its default settings; an integrator is returned as it is."""
     if isinstance(method, Integrator):
         return method
-    return METHODS[checks.choice("method", method, METHODS)]()
+    return _standard(checks.choice("method", method, METHODS))
+
+
+@cache
+def _standard(name: str) -> Integrator:
+    """The integrator of a name; one for all runs, as it is frozen."""
+    return METHODS[name]()
 
 
 __all__ = [

@@ -130,7 +130,7 @@ class OneStep(Integrator):
     @final
     def march(self, chain: Any, memory: Phase, h: float, steps: int, bound: float) -> tuple[Phase, Tally]:
         z = Phase(memory.hi.copy(), memory.lo.copy(), memory.pi.copy())
-        return z, Tally(*self.kernel(chain, z.hi, z.lo, np.atleast_2d(z.pi), h, steps, bound))
+        return z, Tally(*self.kernel(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), h, steps, bound))
 
     @final
     def advance(self, system: RollingDiscs, memory: Phase, h: float, work: Work) -> Phase:
@@ -148,7 +148,7 @@ class OneStep(Integrator):
             z, tally = self.march(chain, memory, tau, 1, np.inf)
             work.add(tally)
         rate = np.empty_like(z.hi)
-        methods.rates(chain, z.hi, z.lo, np.atleast_2d(z.pi), rate)
+        methods.rates(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), rate)
         return Frame(z.hi, z.lo, rate)
 
     @final

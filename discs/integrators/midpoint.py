@@ -10,6 +10,8 @@ from discs import checks
 from discs.integrators.base import OneStep, Work
 from discs.system import Phase, SkewGradient, add
 
+WHOLE = np.ones(1)  # the fractions of a step that a composition of this one alone takes
+
 
 @dataclass(frozen=True)
 class Midpoint(OneStep):
@@ -68,4 +70,4 @@ class Midpoint(OneStep):
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
         from discs.kernels import methods
 
-        return methods.compose(chain, hi, lo, pi, np.ones(1), h, steps, self.sweeps, float(self.tolerance), bound)
+        return methods.compose(chain, hi, lo, pi, WHOLE, h, steps, self.sweeps, float(self.tolerance), bound)
