@@ -13,15 +13,20 @@ from discs.integrators import Work
 from discs.system import Phase
 
 
-def fastest(run: Callable[[], object], times: int) -> float:
-    """Least time of several runs, s, after one to warm up."""
+def spent(run: Callable[[], object], times: int) -> list[float]:
+    """Times of several runs, s, the least first, after one to warm up."""
     run()
-    spent = []
+    found = []
     for _ in range(times):
         begun = clock.perf_counter()
         run()
-        spent.append(clock.perf_counter() - begun)
-    return min(spent)
+        found.append(clock.perf_counter() - begun)
+    return sorted(found)
+
+
+def fastest(run: Callable[[], object], times: int) -> float:
+    """Least time of several runs, s."""
+    return spent(run, times)[0]
 
 
 def sweeps() -> None:
@@ -47,11 +52,12 @@ def sweeps() -> None:
 
 def call() -> None:
     """What a call costs besides its steps."""
-    for scene in (untwisting_rod(), steered_rod()):
-        problem = lump(scene, 8)
-        one = fastest(lambda p=problem: simulate(p, dt=p.duration, frames=1, progress=False), 300)
+    for scene in (untwisting_rod(duration=0.01), steered_rod(duration=0.01)):
+        problem = lump(scene, 32)
+        calls = spent(lambda p=problem: simulate(p, dt=p.duration, frames=1, progress=False), 3000)
         many = fastest(lambda p=problem: simulate(p, dt=p.duration / 100, frames=101, progress=False), 50)
-        print(f"a call with one step: {1e6 * one:.0f} µs; each of 100 steps with a frame: {1e4 * (many - one):.0f} µs")
+        print(f"a call with one step: {1e6 * calls[0]:.0f} µs, median {1e6 * calls[1500]:.0f} µs; "
+              f"each of 100 steps with a frame: {1e4 * (many - calls[0]):.0f} µs")  # fmt: skip
 
 
 def many_discs() -> None:
