@@ -41,7 +41,7 @@ def test_asking_for_frames_does_not_change_the_trajectory(name):
 
 
 def test_a_call_does_little_besides_its_steps():
-    """A call with one step and one frame takes 0.12 ms (docs/speed.py). Time is noisy, so the functions called are counted: 128 where
+    """A call with one step and one frame takes 0.12 ms (docs/speed.py). Time is noisy, so functions called are counted: 128 where
     that was measured, 161 where it was half as long again."""
     problem = untwisting_chain(32, duration=0.01)
     simulate(problem, dt=0.01, frames=1, progress=False)
