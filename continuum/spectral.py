@@ -80,6 +80,7 @@ class SpectralRod(SkewGradient):
     """
 
     rows = ("x", "y", "theta")
+    quadratic = True
 
     def __init__(self, scene: Scene, n: int) -> None:
         rod = scene.rod

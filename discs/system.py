@@ -49,11 +49,13 @@ class SkewGradient(ABC):
     n : number of discs, or of functions that a field is made of.
     rows : names of the rows of q.
     scale : (rows,), the size of a motion: a length, and a radian.
+    quadratic : whether V is quadratic, so that secants do not depend on the step.
     """
 
     n: int
     rows: tuple[str, ...]
     scale: NDArray
+    quadratic: bool
 
     @abstractmethod
     def shape(self, hi: NDArray, lo: NDArray | None = None) -> Any:
@@ -121,14 +123,12 @@ class RollingDiscs(SkewGradient):
     ----------
     rows : names of the coordinates of a disc, "x", "y", "theta" and, with own headings, "phi".
     weights : (rows, n), inertia of each disc against each coordinate's rate.
-    quadratic : whether V is quadratic, so that secants do not depend on the step.
     closed : whether the chain is a ring.
     reach : how many discs to either side a disc's rates depend on.
     stiffest : bound of the entries of C^T (grad^2 V) C, per time squared.
     """
 
     weights: NDArray
-    quadratic: bool
     closed: bool
     reach: int
     stiffest: float

@@ -25,9 +25,9 @@ def gradient(chain, work, move, g):
     """g = grad V, (rows, n), after a move from the base."""
 
 
-def sweep(chain, work, h, pi, p, move):
-    """One sweep of a midpoint step: p and the half step `move`, in place; returns how far the move changed, in units of its
-    scale."""
+def sweep(chain, work, h, pi, p, move, first):
+    """One sweep of a midpoint step, the first or a later one: p and the half step `move`, in place; returns how far the move
+    changed, in units of its scale."""
 
 
 def factors(chain, g):

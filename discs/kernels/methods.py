@@ -36,7 +36,7 @@ def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
             renew(work.c, p, 0.5 * tau, move, chain.scale, change)
             sweep, change_of_move = 0, np.inf
             while sweep < sweeps and not change_of_move <= tolerance:
-                change_of_move = do.sweep(chain, work, tau, pi, p, move)
+                change_of_move = do.sweep(chain, work, tau, pi, p, move, sweep == 0)
                 sweep += 1
             solves += sweep
             unconverged += tolerance > 0 and sweep == sweeps

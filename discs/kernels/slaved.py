@@ -303,7 +303,7 @@ def solve(chain, m, b):
 
 
 @fill(chain.sweep, Slaved)
-def _sweep(chain, work, h, pi, p, move):
+def _sweep(chain, work, h, pi, p, move, first):
     n = p.shape[1]
     c, q, b, m = work.c, p[0], work.rhs[0], work.matrix
     moved(chain, work.base, move, work.links, 2)
@@ -320,10 +320,10 @@ def _sweep(chain, work, h, pi, p, move):
     tensions(chain, work.links, work.tension)
     x, y, z = work.tension
     cx, cy, ct = c
-    first = pi[0]
+    before = pi[0]
     for i in range(n):
         pull = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (z[i] - z[i + 1])
-        b[i] = first[i] - q[i] - half * pull
+        b[i] = before[i] - q[i] - half * pull
     assemble(chain, c, 1.0, half * half, m.a, m.u, m.w, m.corner)
     factor(chain, m)
     solve(chain, m, b)

@@ -68,6 +68,8 @@ class Work(NamedTuple):
     matrix: Matrix
 
 
+TILE = 128
+
 S1, S2, S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
 S4, S5, S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
 C1, C2, C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
@@ -170,58 +172,51 @@ def frame_of(chain, work, dphi, c):
         ct[i], cp[i] = roll[i], heading[i]
 
 
-@part
-def differences(chain, y, d):
-    """Differences of neighbours of y (n,), (n + 1,)."""
-    n = y.size
-    for j in range(1, n):
-        d[j] = y[j] - y[j - 1]
-    if chain.ring:
-        d[n] = y[0] - y[n - 1]
-        d[0] = d[n]
-
-
-@part
-def means(chain, y, d):
-    """Means of neighbours of y (n,), (n + 1,)."""
-    n = y.size
-    for j in range(1, n):
-        d[j] = 0.5 * (y[j] + y[j - 1])
-    if chain.ring:
-        d[n] = 0.5 * (y[0] + y[n - 1])
-        d[0] = d[n]
-
-
 @fill(chain.frame, Steered)
 def _frame(chain, work, move, c):
     frame_of(chain, work, move[3], c)
 
 
 @part
-def secant(chain, work, y, full):
-    """Mean geometry of a step whose half has moved the discs by y, or (not `full`) that of the position moved by y.
+def spread(chain, work, y, a, b):
+    """Differences of neighbours of y (4, n) and the means of its headings at links a to b, in `links` and `couple`."""
+    n, first, last = y.shape[1], max(a, 1), min(b, y.shape[1])
+    for row in range(4):
+        before, after, d = y[row][first - 1 : last - 1], y[row][first:last], work.links[row][first:last]
+        for j in range(d.size):
+            d[j] = after[j] - before[j]
+    before, after, mean = y[3][first - 1 : last - 1], y[3][first:last], work.couple[first:last]
+    for j in range(mean.size):
+        mean[j] = 0.5 * (after[j] + before[j])
+    for j in (0, n):
+        if chain.ring and a <= j < b:
+            for row in range(4):
+                work.links[row, j] = y[row, 0] - y[row, n - 1]
+            work.couple[j] = 0.5 * (y[3, 0] + y[3, n - 1])
+
+
+@part
+def secant(work, a, b, k, full):
+    """Mean geometry at links a to b of a step whose half has spread discs by `links`, or (not `full`) of the position moved so.
 
     Left in `work`: along, the first row of the matrix that takes (dx, dy) to stretch and shear (the second is that turned by a
     quarter), across, and the mean strain in `tension`. Short loops over few arrays each, as compilers can run several places
     at once.
     """
-    per = 1 / chain.k
-    means(chain, y[3], work.couple)
-    for row in range(4):
-        differences(chain, y[row], work.links[row])
-    half, cos, sin = work.couple, work.turned[0], work.turned[1]
+    per = 1 / k
+    half, cos, sin = work.couple[a:b], work.turned[0][a:b], work.turned[1][a:b]
     for j in range(half.size):
         cos[j], sin[j] = turn(half[j])
-    along_x, along_y, across_x, across_y = work.along[0], work.along[1], work.across[0], work.across[1]
-    cos0, sin0 = work.angles[2], work.angles[3]
+    along_x, along_y, across_x, across_y = work.along[0][a:b], work.along[1][a:b], work.across[0][a:b], work.across[1][a:b]
+    cos0, sin0 = work.angles[2][a:b], work.angles[3][a:b]
     for j in range(half.size):
         along_x[j] = cos0[j] * cos[j] - sin0[j] * sin[j]
     for j in range(half.size):
         along_y[j] = sin0[j] * cos[j] + cos0[j] * sin[j]
-    bx, by, dx, dy = work.base[0], work.base[1], work.links[0], work.links[1]
-    stretch, shear = work.tension[0], work.tension[1]
+    bx, by, dx, dy = work.base[0][a:b], work.base[1][a:b], work.links[0][a:b], work.links[1][a:b]
+    stretch, shear = work.tension[0][a:b], work.tension[1][a:b]
     if full:
-        e0, e1 = work.strain[0], work.strain[1]
+        e0, e1 = work.strain[0][a:b], work.strain[1][a:b]
         for j in range(half.size):  # at the end of the step: a half turn further, two half steps on
             c, s = along_x[j] * cos[j] - along_y[j] * sin[j], along_y[j] * cos[j] + along_x[j] * sin[j]
             x, y2 = bx[j] + 2 * dx[j], by[j] + 2 * dy[j]
@@ -246,18 +241,18 @@ def secant(chain, work, y, full):
             along_x[j] *= per
             along_y[j] *= per
     for row in range(2, 4):
-        b, d, strain = work.base[row], work.links[row], work.tension[row]
+        start, d, strain = work.base[row][a:b], work.links[row][a:b], work.tension[row][a:b]
         for j in range(half.size):
-            strain[j] = (b[j] + d[j]) * per
+            strain[j] = (start[j] + d[j]) * per
 
 
 @part
-def tensions(chain, work):
-    """What links pull with, from their mean strain and geometry: tension (in place of the strain) and couple."""
-    per = 1 / chain.k
-    k0, k1 = chain.stiffness[0], chain.stiffness[1]
-    along_x, along_y, across_x, across_y = work.along[0], work.along[1], work.across[0], work.across[1]
-    s0, s1, couple = work.tension[0], work.tension[1], work.couple
+def tensions(work, stiffness, a, b, k):
+    """What links a to b pull with, from their mean strain and geometry: tension (in place of the strain) and couple."""
+    per = 1 / k
+    k0, k1 = stiffness[0][a:b], stiffness[1][a:b]
+    along_x, along_y, across_x, across_y = work.along[0][a:b], work.along[1][a:b], work.across[0][a:b], work.across[1][a:b]
+    s0, s1, couple = work.tension[0][a:b], work.tension[1][a:b], work.couple[a:b]
     for j in range(couple.size):
         s0[j] *= k0[j]
         s1[j] *= k1[j]
@@ -267,9 +262,20 @@ def tensions(chain, work):
         n, q = s0[j], s1[j]
         s0[j], s1[j] = along_x[j] * n - along_y[j] * q, along_y[j] * n + along_x[j] * q
     for row in range(2, 4):
-        stiffness, s = chain.stiffness[row], work.tension[row]
+        k23, s = stiffness[row][a:b], work.tension[row][a:b]
         for j in range(couple.size):
-            s[j] *= stiffness[j] * per
+            s[j] *= k23[j] * per
+
+
+@part
+def pull(chain, work, y, full):
+    """Geometry and tensions after a step or a move y, some links at a time so that what lies between stays at hand."""
+    links = work.couple.size
+    for a in range(0, links, TILE):
+        b = min(a + TILE, links)
+        spread(chain, work, y, a, b)
+        secant(work, a, b, chain.k, full)
+        tensions(work, chain.stiffness, a, b, chain.k)
 
 
 @part
@@ -286,8 +292,7 @@ def pulled(work, c, g):
 
 @fill(chain.gradient, Steered)
 def _gradient(chain, work, move, g):
-    secant(chain, work, move, False)
-    tensions(chain, work)
+    pull(chain, work, move, False)
     for row in range(4):
         x, to = work.tension[row], g[row]
         for i in range(to.size):
@@ -299,26 +304,25 @@ def _gradient(chain, work, move, g):
 
 @fill(chain.pullback, Steered)
 def _pullback(chain, work, move, c, g):
-    secant(chain, work, move, False)
-    tensions(chain, work)
+    pull(chain, work, move, False)
     pulled(work, c, g)
 
 
 @fill(chain.sweep, Steered)
-def _sweep(chain, work, h, pi, p, move):
+def _sweep(chain, work, h, pi, p, move, first):
     n = p.shape[1]
     half = 0.5 * h
     c, b, m = work.c, work.rhs, work.matrix
     frame_of(chain, work, move[3], c)
     forward(c, p, work.step, half)
-    secant(chain, work, work.step, True)
-    tensions(chain, work)
+    pull(chain, work, work.step, True)
     pulled(work, c, b)
     for row in range(2):
         for i in range(n):
             b[row, i] = pi[row, i] - p[row, i] - half * b[row, i]
-    assemble(chain, work, c, 1.0, half * half, m.d, m.o)
-    factor(chain, m)
+    if first:  # later sweeps of a step make do with its matrix, see `discs.integrators.midpoint`
+        assemble(chain, work, c, 1.0, half * half, m.d, m.o)
+        factor(chain, m)
     solve(chain, m, b)
     for row in range(2):
         for i in range(n):
@@ -328,7 +332,8 @@ def _sweep(chain, work, h, pi, p, move):
 
 @fill(chain.stiffness, Steered)
 def _stiffness(chain, work, move, c, matrix):
-    secant(chain, work, move, False)
+    spread(chain, work, move, 0, work.couple.size)
+    secant(work, 0, work.couple.size, chain.k, False)
     assemble(chain, work, c, 0.0, 1.0, matrix.d, matrix.o)
 
 
