@@ -150,7 +150,8 @@ def draw(options: argparse.Namespace) -> None:
     check_writable(out)
     if options.command == "plot":
         with fresh(out) as temporary:
-            run.plot()[0].figure.savefig(temporary, format=out.suffix.removeprefix(".") or "png")
+            figure = run.plot()[0].figure
+            figure.savefig(temporary, format=out.suffix.removeprefix(".") or "png")  # type: ignore[union-attr]
     elif options.command == "animate":
         run.animate(out, fps=options.fps)
     else:
