@@ -5,6 +5,8 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check --editable
 # one thread for linear algebra: the matrices are small, threads only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+# no advertisement of another tool in the middle of `make docs`
+export NO_MKDOCS_2_WARNING := 1
 # what touches every dependency, in a minute or two
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
     $(addprefix continuum/test_, cells.py lagrangian.py))

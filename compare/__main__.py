@@ -36,7 +36,9 @@ def parser() -> argparse.ArgumentParser:
         help="folder for the results: table, convergence, motion, energy over 100/3 durations (default: out)",
     )
     p.add_argument("--n", metavar="N", type=int, nargs="+", default=list(SIZES), help="numbers of discs (default: 17 ... 513)")
-    p.add_argument("--tol", metavar="TOL", type=float, default=1e-5, help="largest error of the field (default: 1e-5)")
+    p.add_argument(
+        "--tol", metavar="TOL", type=float, default=1e-5, help="largest error of the field, length and rad (default: 1e-5)"
+    )
     p.add_argument("--no-limits", action="store_true", help="of the default scene, leave out the discs with headings of their own")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     commands = p.add_subparsers(dest="command", metavar="COMMAND", title="commands (without one: the comparison above)")
@@ -56,7 +58,9 @@ def add_report(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--n", metavar="N", type=int, nargs="+", default=list(report.SIZES), help="numbers of discs (default: 17 ... 257)"
     )
-    p.add_argument("--tol", metavar="TOL", type=float, default=1e-4, help="largest error of the fields (default: 1e-4)")
+    p.add_argument(
+        "--tol", metavar="TOL", type=float, default=1e-4, help="largest error of the fields, length and rad (default: 1e-4)"
+    )
     p.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -72,7 +76,7 @@ def add_precision(p: argparse.ArgumentParser) -> None:
         "--laws", metavar="LAW", nargs="+", choices=LAWS, default=list(LAWS), help=f"of {', '.join(LAWS)} (default: all)"
     )
     p.add_argument("--repeats", metavar="M", type=int, default=5, help="timed runs of each setting (default: 5)")
-    p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run (default: 10)")
+    p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run, s (default: 10)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -82,7 +86,7 @@ def add_stability(p: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", default="out", help="folder for stability.md, stability.csv, stability.png (default: out)"
     )
     p.add_argument("--quick", action="store_true", help="small cases only: about a minute")
-    p.add_argument("--seconds", metavar="S", type=float, help="longest time for one run (default: 60; quick: 1)")
+    p.add_argument("--seconds", metavar="S", type=float, help="longest time for one run, s (default: 60; quick: 1)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
 
 

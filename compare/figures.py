@@ -15,7 +15,7 @@ from continuum import Scene
 from discs import Solution, poses
 from discs import figures as of_discs
 from discs.figures import given_or_new
-from discs.style import BLUE, GREEN, GREY, ORANGE, PURPLE
+from discs.style import BLUE, GREEN, GREY, LABEL, ORANGE, PURPLE
 
 if TYPE_CHECKING:
     from compare.hard_problems import Growth
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from compare.stability_table import Stability
     from compare.study import Study
 
-LABEL = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
+KIND = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
 
 
@@ -33,14 +33,14 @@ def save(ax: Axes, path: str | Path) -> None:
 
 
 def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
-    """Error against number of discs, log-log, with slopes 1 and 2 and the field's own error estimate."""
+    """Error against number of discs, log-log, with slopes −1 and −2 and the field's own error estimate."""
     ax = given_or_new(ax, 6.8, 5.6)
     ax.set_xscale("log")
     if any((s.error > 0).any() for s in studies):
         ax.set_yscale("log")  # a motion without error, as of a rod at rest, has no logarithm
     for study, colour in zip(studies, (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         for j, (name, marker, line) in enumerate(zip(study.fields, "os^d", ("-", "--", ":", "-."), strict=False)):
-            label = f"{LABEL[study.ends]}, {SYMBOL[name]}"
+            label = f"{KIND[study.ends]}, {SYMBOL[name]}"
             ax.plot(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
     # the two slopes, each drawn beside the curves that should follow it
     first = [s for s in studies if s.ends == "springs" and s.scene.rod.curvature == "linear"]
@@ -50,8 +50,8 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
         level = study.error[-1].max() if beside > 1 else study.error[-1].min()
         line = beside * level * (n / n[-1]) ** -slope
         ax.plot(n, line, color=GREY, linewidth=1)
-        above = "bottom" if beside > 1 else "top"
-        ax.text(np.sqrt(n[0] * n[-1]), np.sqrt(line[0] * line[-1]), f"slope {slope}", color=GREY, va=above)
+        where = ("left", "bottom") if beside > 1 else ("right", "top")  # on the side away from the curves
+        ax.text(n[1], line[1], f"slope −{slope} ", color=GREY, ha=where[0], va=where[1])
     floor = max(s.floor for s in studies)
     if floor > 0:
         ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label="estimated error of the field")
@@ -75,7 +75,7 @@ def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
     """
     columns = 3
     rows = -(-(len(run.t) + 1) // columns)
-    figure = Figure(figsize=(4.0 * columns, 3.4 * rows), layout="constrained")
+    figure = Figure(figsize=(3.3 * columns, 2.9 * rows), layout="constrained")
     lines = [np.stack([run.x[f], run.y[f]]) for f in range(len(run.t))]
     if scene.closed:
         lines = [np.append(line, line[:, :1] + np.array(scene.shift)[:, None], axis=1) for line in lines]
@@ -102,9 +102,9 @@ def _stage(ax: Axes3D, middle: NDArray, reach: float) -> None:
     ax.set_zlim(-0.3 * reach, 0.3 * reach)
     ax.set_box_aspect((1, 1, 0.3), zoom=1.2)
     ax.set_zticks([])
-    ax.set_xlabel("x")
+    ax.set_xlabel("x")  # their unit is told from above: the longer label would be cut off
     ax.set_ylabel("y")
-    ax.tick_params(labelsize=7)
+    ax.tick_params(labelsize=8, pad=0)
     ax.view_init(elev=35, azim=-65)
 
 
@@ -114,9 +114,10 @@ def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
     for (label, run), colour in zip(runs.items(), (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         ax.plot(run.t, run.energy, color=colour, label=label, linewidth=1)
         if run.modified_energy is not None:
-            ax.plot(run.t, run.modified_energy, color=colour, linestyle=":", linewidth=3, label="its modified energy")
-    ax.set_xlabel("time t")
-    ax.set_ylabel("energy")
+            its = f"{label.split(',')[0]}: modified energy"
+            ax.plot(run.t, run.modified_energy, color=colour, linestyle=":", linewidth=3, label=its)
+    ax.set_xlabel(LABEL["t"])
+    ax.set_ylabel("energy E (mass length²/time²)")
     ax.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     ax.grid(alpha=0.3)
     return ax
@@ -187,8 +188,8 @@ def stability(study: "Stability", growth: "Growth | None") -> list[Axes]:
         right.plot(growth.q, growth.relation, "-", color=GREY, label="dispersion relation, 33 discs")
         right.plot(growth.q, growth.measured, "o", color=BLUE, markersize=4, label="measured, midpoint")
         right.legend(fontsize=8)
-    right.set_xlabel("wave number q")
-    right.set_ylabel("growth rate σ")
+    right.set_xlabel("wave number q (1/length)")
+    right.set_ylabel("growth rate σ (1/time)")
     right.set_ylim(bottom=0)
     right.set_title("straight rod rolling under the field law", fontsize="medium")
     right.grid(alpha=0.3)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 from tqdm import tqdm
 
@@ -127,28 +128,32 @@ def limits(
 
 
 def _draw(study: Study, unit: Distances, paper: list[Distances], reach: NDArray) -> Any:
-    figure = figures.Figure(figsize=(12, 9), layout="constrained")
+    figure = figures.Figure(figsize=(10, 7.8), layout="constrained")
     axes = figure.subplots(2, 2)
     figures.convergence([study], axes[0, 0])
     axes[0, 0].set_title("(a) N discs against the field, A = G = 10, J = 0.25")
-    for j, (symbol, marker) in enumerate(zip(("x", "y", "θ"), "os^", strict=True)):
-        axes[0, 1].loglog(unit.shear, unit.distance[:, j], marker=marker, color=figures.BLUE, label=symbol)
+    for j, (symbol, line) in enumerate(zip(("x", "y", "θ"), ("o-", "s--", "^:"), strict=True)):
+        axes[0, 1].loglog(unit.shear, unit.distance[:, j], line, color=figures.BLUE, label=symbol)
     _slope(axes[0, 1], unit.shear, 0.5 * unit.distance.min(axis=1)[0], -1.0, "slope −1")
     axes[0, 1].set(
-        xlabel="G, with A = 0 and J = 1/G", ylabel="distance at t = 4.5", title="(b) to the unit law with true curvature"
+        xlabel="G, with A = 0 and J = 1/G",
+        ylabel="distance at t = 4.5 (length, rad)",
+        title="(b) to the unit law with true curvature",
     )
     axes[1, 0].loglog(LOCKING, reach, marker="o", color=figures.ORANGE, label="largest motion of any disc")
     _slope(axes[1, 0], np.array(LOCKING), 0.6 * reach[0], -0.2, "slope −1/5")
-    axes[1, 0].set(xlabel="A = G, with J = 0.05", ylabel="length", title="(c) the rod locks")
+    axes[1, 0].set(xlabel="A = G, with J = 0.05", ylabel="distance (length)", title="(c) the rod locks")
+    axes[1, 0].yaxis.set_minor_locator(NullLocator())
+    axes[1, 0].set_yticks([0.2, 0.5, 1, 2], ["0.2", "0.5", "1", "2"])
     kinds = [
-        f"A = {a:g}, G = {g:g}, J = {j:.2g}" for a, g, j in zip(paper[0].stretch, paper[0].shear, paper[0].inertia, strict=True)
+        f"A = {a:g}, G = {g:g},\nJ = {j:.2g}" for a, g, j in zip(paper[0].stretch, paper[0].shear, paper[0].inertia, strict=True)
     ]
     for d, colour, shift in zip(paper, (figures.ORANGE, figures.BLUE), (-0.18, 0.18), strict=True):
         axes[1, 1].barh(
             np.arange(len(kinds)) + shift, np.hypot(d.distance[:, 0], d.distance[:, 1]), 0.34, color=colour, label=d.against
         )
     axes[1, 1].set_yticks(np.arange(len(kinds)), kinds)
-    axes[1, 1].set(xlabel="distance of centre lines at t = 4.5, length", title="(d) against the paper's rod")
+    axes[1, 1].set(xlabel="distance of centre lines at t = 4.5 (length)", title="(d) against the paper's rod")
     for ax in axes.flat[1:]:
         ax.grid(alpha=0.3, which="both" if ax is not axes[1, 1] else "major")
         ax.legend(fontsize=8)

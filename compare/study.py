@@ -110,7 +110,7 @@ def convergence(
     error = np.empty((len(problems), len(fields)))
     bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
-        run = simulate(problem, method, h, frames=1, progress=False)
+        run = simulate(problem, method, h, frames=1, progress=progress and i == 0)  # the first says that kernels are compiled
         for j, name in enumerate(fields):
             error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
     floor = max(field.error_estimate[name] for name in fields)

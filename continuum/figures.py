@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -16,9 +17,8 @@ from continuum.mesh import semidiscretise
 from continuum.rod import Rod, Scene
 from continuum.scenes import rolling_rod, untwisting_rod
 from discs import Midpoint, Suzuki4, simulate
+from discs.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, SIGNED, UNSIGNED
 
-# Okabe and Ito's colours, distinct for colour-blind readers
-BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 
 
@@ -67,12 +67,12 @@ def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: A
     ax.plot(at, measured_growth(rod, omega, "unit", n, modes), "s", color=GREEN, markersize=5, label=f"measured, {n} discs")
     limit = omega * np.sqrt(rod.torsion_stiffness / rod.bending_stiffness)
     ax.axhline(limit, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
-    ax.text(most, limit, "ω₀√(β/K)", color=GREY, ha="right", va="bottom")
+    ax.text(most, 1.02 * limit, "ω₀√(β/K)", color=GREY, ha="right", va="bottom")
     ax.set_xlabel("wave number q (1/length)")
     ax.set_ylabel("growth rate σ (1/time)")
     ax.set_title(f"The straight rod rolling at ω₀ = {omega:g}")
     ax.set_ylim(-0.05 * limit, 1.15 * limit)
-    ax.legend(fontsize=8)
+    ax.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.45, 0.08))
     ax.grid(alpha=0.3)
     return ax
 
@@ -83,14 +83,18 @@ def fluxes(scene: Scene, n: int = 513, frames: int = 451) -> Figure:
     law = balances(scene.rod, run, scene.rolling, scene.closed, scene.shift)["energy"]
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    parts = ((left, law.density, "density", "viridis", 0.0), (right, law.flux, "flux, towards larger s", "RdBu_r", None))
-    for ax, values, name, colours, low in parts:
+    parts = (
+        (left, law.density, "density of energy T + V (energy/length)", UNSIGNED, "max"),
+        (right, law.flux, "flux of energy towards larger s (energy/time)", SIGNED, "both"),
+    )
+    for ax, values, name, stops, beyond in parts:
         high = np.quantile(np.abs(values), 0.995)
-        image = ax.pcolormesh(run.s, run.t, values, cmap=colours, vmin=-high if low is None else low, vmax=high, rasterized=True)
-        figure.colorbar(image, ax=ax, extend="max" if low is not None else "both")
-        ax.set_xlabel("s")
-        ax.set_title(f"Energy: {name}")
-    left.set_ylabel("t")
+        colours = LinearSegmentedColormap.from_list(name, stops)
+        image = ax.pcolormesh(run.s, run.t, values, cmap=colours, vmin=-high if beyond == "both" else 0, vmax=high, rasterized=True)
+        ax.contour(run.s, run.t, values, levels=np.linspace(-high, high, 13), colors=INK, linewidths=0.4)
+        figure.colorbar(image, ax=ax, extend=beyond).set_label(name)
+        ax.set_xlabel(LABEL["s"])
+    left.set_ylabel(LABEL["t"])
     figure.suptitle(f"{scene.name}, {scene.rolling} law", fontsize=10)
     return figure
 

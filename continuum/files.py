@@ -27,7 +27,11 @@ def read_scene(path: str | Path) -> Scene:
         raise ValueError(f"the scene file {path} cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"the scene file {path} is not TOML: {error}") from None
-    make = SCENES[checks.choice("scene", content.pop("scene", None), SCENES)]
+    if "scene" not in content:
+        raise ValueError(
+            f"the scene file {path} must name its scene, as in scene = {next(iter(SCENES))!r}; its keys are {list(content)}"
+        )
+    make = SCENES[checks.choice("scene", content.pop("scene"), SCENES)]
     own = [name for name, p in inspect.signature(make).parameters.items() if p.kind is not p.VAR_KEYWORD]
     for key in content:
         checks.choice(f"key of {make.__name__}", key, (*own, *PAPER, *(LAW if make is not steered_rod else ())))

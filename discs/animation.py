@@ -8,6 +8,7 @@ is one collection, sorted so; the ground is drawn once: a frame takes some hundr
 import os
 from collections.abc import Iterator
 from contextlib import closing
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -89,9 +90,12 @@ def _write_mp4(path: Path, pictures: Iterator[NDArray], fps: float, size: tuple[
 def _write_gif(path: Path, pictures: Iterator[NDArray], fps: float, size: tuple[int, int]) -> None:
     from PIL import Image
 
-    first = Image.fromarray(next(pictures)).convert("RGB").quantize(64)
-    rest = (Image.fromarray(p).convert("RGB").quantize(palette=first, dither=Image.Dither.NONE) for p in pictures)
-    first.save(path, save_all=True, append_images=rest, duration=round(1000 / fps), loop=0)
+    palette = Image.fromarray(begin := next(pictures)).convert("RGB").quantize(64)
+    # all by the same palette, the first too: its own would make white another white
+    every = (
+        Image.fromarray(p).convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for p in chain([begin], pictures)
+    )
+    next(every).save(path, save_all=True, append_images=every, duration=round(1000 / fps), loop=0)
 
 
 class Stage:
@@ -163,7 +167,8 @@ class Stage:
         return LineCollection(list(self._flat(np.array(lines))), colors=GROUND, linewidths=1.2 * scale)
 
     def picture(self, f: int) -> NDArray:
-        """Frame f of the run, (height, width, 4) bytes, red, green, blue and opacity."""
+        """Frame f of the run, counted from the end if negative; (height, width, 4) bytes, red, green, blue and opacity."""
+        f = range(self.run.t.size)[f]
         self._tracked.set_segments(list(self._tracks[:, : f + 1]))
         self._time.set_text(f"t = {self.run.t[f]:.2f}")
         self._place(f)

@@ -22,7 +22,12 @@ OFFERS = sorted({name for method in METHODS.values() for name in method.offers})
 def add_run_options(p: argparse.ArgumentParser) -> None:
     """Options of `run_discs`."""
     p.add_argument("--n", metavar="N", type=int, default=64, help="number of discs (default: 64)")
-    p.add_argument("--ends", choices=[e for e in ENDS if e != "ring"], default="springs", help="free ends (default: springs)")
+    p.add_argument(
+        "--ends",
+        choices=[e for e in ENDS if e != "ring"],
+        default="springs",
+        help="how the free ends are treated (default: springs)",
+    )
     p.add_argument("--method", choices=("auto", *METHODS), metavar="NAME", help=f"auto, {', '.join(METHODS)} (default: midpoint)")
     p.add_argument("--dt", metavar="DT", type=float, help="time step, time (default: suggested from the chain, and said)")
     p.add_argument("--tol", metavar="TOL", type=float, help="instead of --dt: largest error, relative (default: none)")
@@ -54,6 +59,10 @@ def add_file_commands(commands: Any) -> None:
         p = commands.add_parser(name, help=what, description=what[0].upper() + what[1:] + ".")
         p.add_argument("file", metavar="FILE", help="a saved run")
         p.add_argument("--out", metavar="FILE", default=out, help=f"file to write (default: {out})")
+        if name == "animate":
+            p.add_argument("--fps", metavar="N", type=float, default=25, help="pictures a second (default: 25)")
+        if name == "view":
+            p.add_argument("--beside", metavar="FILE", help="another saved run, shown to the right (default: none)")
         p.set_defaults(run=draw)
 
 
@@ -139,14 +148,14 @@ def draw(options: argparse.Namespace) -> None:
     """Write the picture, movie or page that `options.command` names."""
     run, out = load(options.file), Path(options.out)
     check_writable(out)
-    make = getattr(run, options.command, None)
-    if make is None:
-        raise ValueError(f"this version has no Solution.{options.command}")
     if options.command == "plot":
         with fresh(out) as temporary:
-            make()[0].figure.savefig(temporary, format=out.suffix.removeprefix(".") or "png")
+            figure = run.plot()[0].figure
+            figure.savefig(temporary, format=out.suffix.removeprefix(".") or "png")  # type: ignore[union-attr]
+    elif options.command == "animate":
+        run.animate(out, fps=options.fps)
     else:
-        make(out)
+        run.view(out, beside=load(options.beside) if options.beside else None)
     print(f"written to {out}")
 
 

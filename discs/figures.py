@@ -50,7 +50,7 @@ def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Ax
     return axes
 
 
-def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 15, radius: float | None = None) -> Axes:
+def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 9, radius: float | None = None) -> Axes:
     """The centre line from above at several times, with the discs: bars, each with the tip of its spoke d_3 as seen from above.
 
     Parameters
@@ -118,7 +118,8 @@ def profiles(run: Solution, name: str = "theta", ax: Axes | None = None, instant
         ax.plot(run.s, values[f], color=BLUE, alpha=shade, label=f"t = {run.t[f]:.3g}")
     ax.set_xlabel(LABEL["s"])
     ax.set_ylabel(LABEL[name])
-    ax.legend(fontsize=8)
+    # above: the curves leave no corner free
+    ax.legend(fontsize=8, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1), frameon=False, handlelength=1, columnspacing=0.8)
     ax.grid(alpha=0.3)
     return ax
 
@@ -147,7 +148,7 @@ PANELS = {
 
 def vakonomic() -> Figure:
     """Vakonomic motions beside the nonholonomic one: a disc on an incline, how the two part, a chain of three discs."""
-    figure = Figure(figsize=(14.0, 4.9), layout="constrained")
+    figure = Figure(figsize=(11.5, 4.3), layout="constrained")
     axes = figure.subplots(1, 3)
     _incline(axes[0], axes[1])
     _chain(axes[2])
@@ -161,28 +162,28 @@ def _incline(above: Axes, parted: Axes) -> None:
     q = np.array([0.0, 0.0, 0.0, phi])
     v = np.array([-radius * omega * np.sin(phi), radius * omega * np.cos(phi), omega, turning])
     charges = {
-        "μ(0) = 0": (np.zeros(2), ORANGE),
-        "μ(0) = −m ṙ": (-m * v[:2], GREEN),
-        "μ(0) = −m ṙ + 0.1 d₁": (-m * v[:2] + 0.1 * np.array([np.cos(phi), np.sin(phi)]), PURPLE),
+        "μ(0) = 0": (np.zeros(2), ORANGE, "-"),
+        "μ(0) = −m ṙ": (-m * v[:2], GREEN, "--"),
+        "μ(0) = −m ṙ + 0.1 d₁": (-m * v[:2] + 0.1 * np.array([np.cos(phi), np.sin(phi)]), PURPLE, "-."),
     }
     long, short = np.linspace(0, 10, 401), np.array([0.0, *np.geomspace(0.01, 3, 40)])
     own = solve(disc, q, v, short, tol=1e-13)
     above.plot(*solve(disc, q, v, long).q[:, :2].T, color=BLUE, linewidth=2, label="nonholonomic")
-    for label, (mu, colour) in charges.items():
-        above.plot(*solve(disc, q, v, long, mu, tol=1e-8).q[:, :2].T, color=colour, label=label)
+    for label, (mu, colour, line) in charges.items():
+        above.plot(*solve(disc, q, v, long, mu, tol=1e-8).q[:, :2].T, line, color=colour, label=label)
         gap = np.abs(solve(disc, q, v, short, mu, tol=1e-13).q[1:, 3] - own.q[1:, 3])
-        parted.loglog(short[1:], gap, color=colour, label=label)
+        parted.loglog(short[1:], gap, line, color=colour, label=label)
     for power, level in ((2, 0.04), (3, 0.04), (4, 0.02)):
         t = np.array([0.015, 0.06])
         parted.loglog(t, level * t**power, color=GREY, linewidth=1)
         parted.text(t[-1] * 1.1, level * t[-1] ** power, f"t{'²³⁴'[power - 2]}", color=GREY, va="center")
     above.plot(0, 0, "o", color="black", markersize=5)
-    above.annotate("down", (0.06, 0.06), (0.06, 0.2), xycoords="axes fraction", arrowprops={"arrowstyle": "->"}, ha="center")
+    above.annotate("down", (0.09, 0.06), (0.09, 0.2), xycoords="axes fraction", arrowprops={"arrowstyle": "->"}, ha="center")
     _from_above(above, "one disc on an incline")
-    above.legend(fontsize=8, loc="center right")
-    parted.set_xlabel("time t")
+    above.legend(fontsize=8, loc="center right", bbox_to_anchor=(1, 0.62), handlelength=1.5)
+    parted.set_xlabel(LABEL["t"])
     parted.set_ylabel("|φ vakonomic − φ nonholonomic|  (rad)")
-    parted.set_title("they part")
+    parted.set_title("they part", fontsize="medium")
     parted.legend(fontsize=8)
     parted.grid(alpha=0.3)
 
@@ -220,7 +221,7 @@ def _paths(ax: Axes, run: Motion, label: str, colour: str) -> None:
 
 def _from_above(ax: Axes, title: str) -> None:
     ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("x")
-    ax.set_ylabel("y")
-    ax.set_title(title)
+    ax.set_xlabel(LABEL["x"])
+    ax.set_ylabel(LABEL["y"])
+    ax.set_title(title, fontsize="medium")
     ax.grid(alpha=0.3)

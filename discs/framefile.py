@@ -72,6 +72,9 @@ class FrameFile:
             self._fd = os.open(path, (os.O_RDWR if writable else os.O_RDONLY) | getattr(os, "O_BINARY", 0))
         except (OSError, ValueError, TypeError) as error:
             raise ValueError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
+        if self.path.is_dir():
+            os.close(self._fd)
+            raise ValueError(f"{path} cannot be read: it is a folder")
         try:
             self._size = os.fstat(self._fd).st_size
             self._places = self._find()

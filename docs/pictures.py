@@ -1,4 +1,8 @@
-"""Make the pictures of docs/pictures.md and the README's: `python docs/pictures.py`, half a minute; the page needs chromium."""
+"""Make the pictures of docs/pictures.md, motion.png, vakonomic.png and rod.gif: `python docs/pictures.py`, half a minute.
+
+The page's picture needs chromium. convergence.png, energy.png and limits.png are the main job's; `python -m continuum.figures
+docs/images` makes those of the field.
+"""
 
 import shutil
 import sys
@@ -8,8 +12,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from compare import lump
+from compare import figures, lump
 from continuum import solve, untwisting_rod
+from discs import figures as of_discs
 from discs import simulate
 from discs.animation import Stage
 
@@ -41,13 +46,15 @@ def main() -> None:
     run.plot()[0].figure.savefig(IMAGES / "first-look.png", dpi=80)
     run.animate(IMAGES / "rod.gif", fps=20, size=(640, 360))
     Image.fromarray(Stage(run, size=(960, 540)).picture(-1)).convert("RGB").save(IMAGES / "movie.png", optimize=True)
+    figures.motion(solve(scene, tol=1e-3, frames=5), scene).savefig(IMAGES / "motion.png", dpi=110)
+    of_discs.vakonomic().savefig(IMAGES / "vakonomic.png", dpi=110)
     if not shutil.which("chromedriver"):
         sys.exit("no chromedriver: view.png is not made")
     few = simulate(lump(scene, n=17), dt=0.02, frames=91)
     field = solve(scene, tol=1e-3, frames=91)
     with tempfile.TemporaryDirectory() as folder:
         page = few.view(Path(folder) / "both.html", beside=field, titles=("17 discs, plain springs", "the rod they become"))
-        shot(page.path, IMAGES / "view.png", 4.5)
+        shot(page.path, IMAGES / "view.png", 3.0)
 
 
 if __name__ == "__main__":

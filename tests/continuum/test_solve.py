@@ -202,7 +202,7 @@ def test_scene_files(tmp_path):
     assert (scene.rolling, scene.duration, scene.rod.radius, scene.rod.density) == ("unit", 2.0, 0.7, 1.0)
     for text, message in [
         ('scene = "flying_rod"', "scene must be one of 'untwisting_rod', .*; got 'flying_rod'"),
-        ("rolling = 'unit'", "scene must be one of"),
+        ("rolling = 'unit'", r"must name its scene, as in scene = 'untwisting_rod'; its keys are \['rolling'\]"),
         ("scene = 'untwisting_rod'\nmass = 3", "key of untwisting_rod must be one of"),
         ("scene = 'untwisting_rod'\nradius = 'big'", "radius must be a finite number; got 'big'"),
         ("scene = ", "is not TOML"),

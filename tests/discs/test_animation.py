@@ -53,6 +53,11 @@ def test_gif_has_every_frame(run, tmp_path):
         assert picture.size == (320, 180)
         assert picture.info["duration"] == 50
         assert picture.info["loop"] == 0
+        corners = []
+        for f in range(picture.n_frames):
+            picture.seek(f)
+            corners.append(picture.convert("RGB").getpixel((2, 2)))
+    assert len(set(corners)) == 1  # what does not move keeps its colour
 
 
 def test_discs_stand_and_roll_where_they_should():
@@ -105,6 +110,9 @@ def test_pictures_show_the_motion(run):
     assert first.shape == (180, 320, 4)
     assert (abs(first.astype(int) - last) > 60).any(axis=-1).mean() > 0.005
     np.testing.assert_array_equal(stage.picture(0), first)
+    np.testing.assert_array_equal(stage.picture(-1), last)  # tracks too
+    with pytest.raises(IndexError):
+        stage.picture(7)
 
 
 @pytest.mark.parametrize(

@@ -133,19 +133,24 @@ def test_pictures_are_those_of_solution(tmp_path, capsys, monkeypatch):
     from matplotlib.figure import Figure
 
     monkeypatch.setattr(Solution, "plot", lambda self: [Figure().subplots()], raising=False)
-    for name in ("animate", "view"):
-        monkeypatch.setattr(Solution, name, lambda self, out, name=name: out.write_text(f"{name} {self.s.size}"), raising=False)
+    monkeypatch.setattr(Solution, "animate", lambda self, out, fps: out.write_text(f"animate {self.s.size} {fps:g}"))
+    monkeypatch.setattr(
+        Solution, "view", lambda self, out, beside: out.write_text(f"view {self.s.size} {beside and beside.s.size}")
+    )
     assert main(["plot", str(path), "--out", str(tmp_path / "a.png")]) == 0
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-    assert main(["animate", str(path), "--out", str(tmp_path / "a.mp4")]) == 0
+    assert main(["animate", str(path), "--out", str(tmp_path / "a.mp4"), "--fps", "12"]) == 0
     assert main(["view", str(path), "--out", str(tmp_path / "a.html")]) == 0
-    assert ((tmp_path / "a.mp4").read_text(), (tmp_path / "a.html").read_text()) == ("animate 5", "view 5")
+    assert ((tmp_path / "a.mp4").read_text(), (tmp_path / "a.html").read_text()) == ("animate 5 12", "view 5 None")
     assert capsys.readouterr().out.count("written to") == 3
     assert main(["plot", str(path), "--out", str(tmp_path / "a.xyz")]) == 2
     assert "error: Format 'xyz' is not supported" in capsys.readouterr().err
-    monkeypatch.delattr(Solution, "view")
-    if not hasattr(Solution, "view"):
-        assert main(["view", str(path), "--out", str(tmp_path / "b.html")]) == 2
+    other = tmp_path / "other.nc"
+    simulate(untwisting_chain(7), dt=0.05, frames=2, progress=False, engine="plain").save(other)
+    assert main(["view", str(path), "--beside", str(other), "--out", str(tmp_path / "b.html")]) == 0
+    assert (tmp_path / "b.html").read_text() == "view 5 7"
+    assert main(["view", str(path), "--beside", str(tmp_path / "none.nc"), "--out", str(tmp_path / "c.html")]) == 2
+    assert "none.nc cannot be read: No such file" in capsys.readouterr().err
 
 
 def subparsers(p):
