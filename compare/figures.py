@@ -123,7 +123,7 @@ def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
     return ax
 
 
-OURS = {"midpoint": BLUE, "suzuki4": ORANGE, "gauss6": GREEN, "gauss8": PURPLE, "auto": "black"}
+OURS = {"midpoint": BLUE, "suzuki4": ORANGE, "gauss4": "#56B4E9", "gauss6": GREEN, "gauss8": PURPLE, "auto": "black"}
 
 
 def precision(study: "WorkPrecision") -> list[Axes]:
@@ -133,11 +133,12 @@ def precision(study: "WorkPrecision") -> list[Axes]:
     sizes = list(dict.fromkeys(n for _, n in study.problems))
     peers = list(dict.fromkeys(r.method for r in study.rows if not r.ours))
     marks = dict(zip(peers, ("s", "D", "^", "v", "<", ">", "p", "*", "h", "X", "P", "d", "8", "H", "1", "2"), strict=False))
-    figure = Figure(figsize=(1.5 + 3.3 * max(len(sizes), 2), 1.8 + 3.4 * len(names)), layout="constrained")
-    grid = figure.subplots(len(names), len(sizes), squeeze=False, sharex=True, sharey=True)
+    columns = len(sizes) if len(names) > 1 else min(len(sizes), 2)  # a single problem fills a page's width
+    rows = -(-len(names) * len(sizes) // columns)
+    figure = Figure(figsize=(1.5 + 3.3 * max(columns, 2), 1.8 + 3.4 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     shown: dict[str, Any] = {}
-    for (row, name), (column, n) in ((a, b) for a in enumerate(names) for b in enumerate(sizes)):
-        ax = grid[row, column]
+    for ax, (name, n) in zip(grid.ravel(), ((name, n) for name in names for n in sizes), strict=False):
         for method in (*peers, *OURS):
             errors, seconds = study.curve(name, n, method)
             if not errors.size:
@@ -151,14 +152,13 @@ def precision(study: "WorkPrecision") -> list[Axes]:
             shown.setdefault(method, line)
         ax.set_title(f"{name}, N = {n}", fontsize="medium")
         ax.grid(alpha=0.3)
-        if row == len(names) - 1:
-            ax.set_xlabel("wall time (s)")
-        if column == 0:
-            ax.set_ylabel("relative error of x, y, θ")
+    for ax in grid[-1]:
+        ax.set_xlabel("wall time (s)")
+    for ax in grid[:, 0]:
+        ax.set_ylabel("relative error of x, y, θ")
     order = [m for m in (*OURS, *peers) if m in shown]
-    columns = 6 if len(sizes) > 2 else 4
     lines = [shown[m] for m in order]
-    figure.legend(lines, order, loc="outside lower center", ncols=columns, fontsize="small", frameon=False)
+    figure.legend(lines, order, loc="outside lower center", ncols=6 if columns > 2 else 4, fontsize="small", frameon=False)
     return list(grid.ravel())
 
 
