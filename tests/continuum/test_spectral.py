@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+from tqdm import tqdm
 
 from continuum import Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
 from continuum.bases import polynomials, waves
-from continuum.spectral import SpectralRod
+from continuum.galerkin import SpectralRod
+from continuum.kernels.spectral import gauss
+from continuum.spectral import Course
 from discs import Gauss6, Gauss8, SimulationError
 from discs.integrators.base import Work
+from discs.integrators.gauss import tableau
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
 POSITIONS = ("x", "y", "theta")
@@ -61,6 +65,11 @@ def scenes():
     yield "shifted", rolling_rod(amplitude=0.02, duration=1.0)
 
 
+def unit_scenes():
+    yield "ring unit", breathing_ring("unit", duration=0.5, radius=0.7)
+    yield "shifted unit", rolling_rod("unit", amplitude=0.02, duration=1.0)
+
+
 @pytest.mark.parametrize(("name", "scene"), [pytest.param(*pair, id=pair[0]) for pair in scenes()])
 def test_skew_gradient_and_energy(name, scene):
     """C^T is the transpose of C, several configurations at once are the same as one by one, and energy is constant."""
@@ -85,6 +94,47 @@ def test_skew_gradient_and_energy(name, scene):
         z = method.step(rod, z, scene.duration / 20, work)
     assert rod.energy(z) == pytest.approx(begun, rel=1e-11)
     assert work.unconverged == 0
+
+
+@pytest.mark.parametrize(("name", "scene"), [pytest.param(*pair, id=pair[0]) for pair in [*scenes(), *unit_scenes()]])
+def test_twins_agree(name, scene):
+    """Compiled steps and plain ones: converged, and after one sweep, where the matrix it solves with matters."""
+    rod, h = SpectralRod(scene, 21), scene.duration / 16
+    for method in (Gauss8(tolerance=1e-13), Gauss8(sweeps=1, tolerance=0)):
+        z, work = rod.start(scene), Work()
+        hi, lo, pi = z.hi.copy(), z.lo.copy(), z.pi[None].copy()
+        taken, sweeps = gauss(rod.kernel, hi, lo, pi, tuple(tableau(4)), h, 2, method.sweeps, method.tolerance, np.inf)
+        for _ in range(2):
+            z = method.step(rod, z, h, work)
+        assert taken == 2
+        assert abs(4 * sweeps - work.gradients) <= 4
+        np.testing.assert_allclose(hi + lo, z.hi + z.lo, atol=2e-11)
+        np.testing.assert_allclose(pi[0], z.pi, atol=1e-13)
+
+
+def test_both_engines_stop_where_the_other_does(rolling):
+    """Frames between steps, a step that does not converge, energy out of bounds, a heading that is lost."""
+    scene, times = untwisting_rod(rolling, **UNEVEN), np.array([0.0, 1.3, 4.5])
+    a, b = (Course(scene, times, 1e-10, tqdm(disable=True), compiled).run(15, 96) for compiled in (True, False))
+    for name, value in a.items():
+        np.testing.assert_allclose(value, b[name], atol=1e-9, err_msg=name)
+    for ends, match in [
+        (breathing_ring("unit", duration=1.2, radius=0.7), "lost its heading"),
+        (untwisting_rod(rolling, duration=400.0), "steps do not converge"),
+    ]:
+        said = []
+        for compiled in (True, False):
+            with pytest.raises(SimulationError, match=match) as caught, np.errstate(all="ignore"):
+                Course(ends, ends.duration * np.ones(1), 1e-8, tqdm(disable=True), compiled).run(15, 40)
+            said.append(str(caught.value))
+        assert said[0] == said[1]
+    rod = SpectralRod(scene, 15)
+    z = rod.start(scene)
+    pi, hi = z.pi[None].copy(), z.hi.copy()
+    taken, _ = gauss(rod.kernel, hi, z.lo.copy(), pi, tuple(tableau(4)), 0.1, 5, 50, 1e-8, 0.5 * rod.energy(z))
+    assert taken == 0
+    np.testing.assert_array_equal(hi, z.hi)
+    np.testing.assert_array_equal(pi[0], z.pi)
 
 
 @pytest.mark.parametrize("parameters", [{}, UNEVEN | {"duration": 2.5}])
