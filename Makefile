@@ -21,6 +21,7 @@ test: .venv/test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m discs.kernels
+	$(BIN)/python -m continuum.kernels
 	$(BIN)/pytest
 
 # the lessons with their pictures, and the site; open site/index.html

@@ -34,7 +34,7 @@ def solve(
     """The fields of a scene.
 
     "spectral": Galerkin's method with polynomials, or Fourier series if the scene is closed, refined until it no longer
-    matters; see `continuum.spectral`. For slaved headings and linear curvature.
+    matters; see `continuum.galerkin` and `continuum.spectral`. For slaved headings and linear curvature.
 
     "richardson": second-order differences in s on meshes of spacing k, k/2, k/4, ...; two neighbours u_k, u_{k/2} give
     T = u_{k/2} + (u_{k/2} - u_k)/3, which removes the k^2 term, and two neighbouring T the estimate of what is left,

@@ -2,7 +2,7 @@ r"""What every chain of rolling discs is: a skew-gradient system q' = C(q) pi, p
 
 The columns of C span the velocities that rolling allows, scaled so that C^T M C = 1 for the mass matrix M; pi are the rates along
 them. H = |pi|^2/2 + V(q) is constant because the two factors C are each other's transpose, and the constraint holds identically.
-`discs.slaved` and `discs.steered` are chains in this form; the derivations stand there. (`continuum.spectral` is the field.)
+`discs.slaved` and `discs.steered` are chains in this form; the derivations stand there. (`continuum.galerkin` is the field.)
 
 A configuration q is an array (rows, n), one row for each coordinate of a disc. All that forces need of it is its *shape*: the
 differences between neighbours, and headings where a disc has its own. Shapes are formed from both parts of the positions.

@@ -1,13 +1,20 @@
 """Galerkin's method for slaved headings: its functions, its tolerance, against exact rings and against chains of discs."""
 
+from functools import partial
+
 import numpy as np
 import pytest
+from tqdm import tqdm
 
-from continuum import Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
+from continuum import Rod, Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
 from continuum.bases import polynomials, waves
-from continuum.spectral import SpectralRod
+from continuum.galerkin import SpectralRod
+from continuum.kernels.spectral import gauss
+from continuum.scenes import PAPER
+from continuum.spectral import Course
 from discs import Gauss6, Gauss8, SimulationError
 from discs.integrators.base import Work
+from discs.integrators.gauss import tableau
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
 POSITIONS = ("x", "y", "theta")
@@ -46,11 +53,11 @@ def test_functions(make):
 
 
 def followed(scene, n, steps):
-    """The rod on n functions, and its state at the end."""
-    rod, method = SpectralRod(scene, n), Gauss8(tolerance=1e-13)
+    """The rod on n functions, and its state at the end, by compiled steps."""
+    rod = SpectralRod(scene, n)
     z = rod.start(scene)
-    for _ in range(steps):
-        z = method.step(rod, z, scene.duration / steps, Work())
+    taken, _ = gauss(rod.kernel, z.hi, z.lo, z.pi[None], tuple(tableau(4)), scene.duration / steps, steps, 50, 1e-12, np.inf)
+    assert taken == steps
     return rod, z
 
 
@@ -59,6 +66,11 @@ def scenes():
     yield "free unit", untwisting_rod("unit", **UNEVEN, duration=1.0)
     yield "ring", breathing_ring(duration=0.5, radius=0.7)
     yield "shifted", rolling_rod(amplitude=0.02, duration=1.0)
+
+
+def unit_scenes():
+    yield "ring unit", breathing_ring("unit", duration=0.5, radius=0.7)
+    yield "shifted unit", rolling_rod("unit", amplitude=0.02, duration=1.0)
 
 
 @pytest.mark.parametrize(("name", "scene"), [pytest.param(*pair, id=pair[0]) for pair in scenes()])
@@ -87,12 +99,71 @@ def test_skew_gradient_and_energy(name, scene):
     assert work.unconverged == 0
 
 
-@pytest.mark.parametrize("parameters", [{}, UNEVEN | {"duration": 2.5}])
-def test_tolerance_is_met_and_the_estimate_is_honest(rolling, parameters):
-    """Against 77 functions and 400 steps, off by about 2e-9: true error below tol, estimate within a factor of 5 of it."""
-    scene = untwisting_rod(rolling, **parameters)
+@pytest.mark.parametrize(("name", "scene"), [pytest.param(*pair, id=pair[0]) for pair in [*scenes(), *unit_scenes()]])
+def test_twins_agree(name, scene):
+    """Compiled steps and plain ones: converged, and after one sweep, where the matrix it solves with matters."""
+    rod, h = SpectralRod(scene, 21), scene.duration / 16
+    for method in (Gauss8(tolerance=1e-13), Gauss8(sweeps=1, tolerance=0)):
+        z, work = rod.start(scene), Work()
+        hi, lo, pi = z.hi.copy(), z.lo.copy(), z.pi[None].copy()
+        taken, sweeps = gauss(rod.kernel, hi, lo, pi, tuple(tableau(4)), h, 2, method.sweeps, method.tolerance, np.inf)
+        for _ in range(2):
+            z = method.step(rod, z, h, work)
+        assert taken == 2
+        assert abs(4 * sweeps - work.gradients) <= 4
+        np.testing.assert_allclose(hi + lo, z.hi + z.lo, atol=2e-11)
+        np.testing.assert_allclose(pi[0], z.pi, atol=1e-13)
+
+
+def test_both_engines_stop_where_the_other_does(rolling):
+    """Frames between steps, a step that does not converge, energy out of bounds, a heading that is lost."""
+    scene, times = untwisting_rod(rolling, **UNEVEN), np.array([0.0, 1.3, 4.5])
+    a, b = (Course(scene, times, 1e-10, tqdm(disable=True), compiled).run(15, 96) for compiled in (True, False))
+    for name, value in a.items():
+        np.testing.assert_allclose(value, b[name], atol=1e-9, err_msg=name)
+    for ends, match in [
+        (breathing_ring("unit", duration=1.2, radius=0.7), "lost its heading"),
+        (untwisting_rod(rolling, duration=400.0), "steps do not converge"),
+    ]:
+        said = []
+        for compiled in (True, False):
+            with pytest.raises(SimulationError, match=match) as caught, np.errstate(all="ignore"):
+                Course(ends, ends.duration * np.ones(1), 1e-8, tqdm(disable=True), compiled).run(15, 40)
+            said.append(str(caught.value))
+        assert said[0] == said[1]
+    rod = SpectralRod(scene, 15)
+    z = rod.start(scene)
+    pi, hi = z.pi[None].copy(), z.hi.copy()
+    taken, _ = gauss(rod.kernel, hi, z.lo.copy(), pi, tuple(tableau(4)), 0.1, 5, 50, 1e-8, 0.5 * rod.energy(z))
+    assert taken == 0
+    np.testing.assert_array_equal(hi, z.hi)
+    np.testing.assert_array_equal(pi[0], z.pi)
+
+
+def bent(s):
+    """A line with phi' = 0.6 (1 - cos(2 pi s/3)), that rolls more at one end than at the other."""
+    u, w = np.polynomial.legendre.leggauss(40)
+    places = np.outer(s, (u + 1) / 2)
+    z = np.exp(0.6j * (places - 3 / (2 * np.pi) * np.sin(2 * np.pi * places / 3))) @ w * s / 2
+    return z.real, z.imag, 0 * s, 0.3 + 0.9 * np.cos(np.pi * s / 3)
+
+
+def held_out():
+    """Scenes and parameters that the ladder of sizes and the estimate were not chosen on; most break a condition of the ends."""
+    yield untwisting_rod
+    yield partial(untwisting_rod, **UNEVEN | {"duration": 2.5})
+    yield partial(untwisting_rod, duration=5.0, radius=0.25, twist=0.8, spin_inertia=0.7)
+    yield partial(untwisting_rod, duration=4.0, bending_stiffness=0.35)
+    rod = Rod(**PAPER | {"length": 3.0, "bending_stiffness": 0.5, "density": 0.9, "radius": 0.5})
+    yield lambda rolling: Scene(rod=rod, initial=bent, duration=3.0, rolling=rolling)
+
+
+@pytest.mark.parametrize("make", [pytest.param(make, id=str(i)) for i, make in enumerate(held_out())])
+def test_tolerance_is_met_and_the_estimate_is_honest(rolling, make):
+    """Against 77 functions and 400 steps, off by 2e-9 to 2e-7: true error below tol, estimate within a factor of 5 of it."""
+    scene = make(rolling)
     rod, z = followed(scene, 77, 400)
-    for tol in (1e-3, 1e-4, 1e-5, 1e-6):
+    for tol in (1e-3, 1e-4, 1e-5) if scene.name == "scene" else (1e-3, 1e-4, 1e-5, 1e-6):
         field = solve(scene, tol, frames=1, progress=False)
         truth = rod.at(z, field.s)
         error = max(np.abs(getattr(field, name)[-1] - truth[name]).max() for name in POSITIONS)

@@ -1,0 +1,326 @@
+"""Gauss collocation of a rod on n functions; the plain twins are `continuum.galerkin.SpectralRod` and `discs.integrators.gauss`.
+
+Arrays have a row for each stage, `s` of them, F finer points. A frame C at one configuration can serve all stages.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.kernels.compiled import kernel
+from discs.kernels.compiled import part as _part
+from discs.kernels.shared import add, copy
+
+
+def part(function):
+    """A part of a kernel that multiplies matrices, for which numba makes arrays."""
+    return _part(function, _nrt=True)
+
+
+class Spectral(NamedTuple):
+    """Parameters. The matrices and weights are those of `continuum.bases.Basis`, for row vectors on their left.
+
+    bends : (n, n + 3 F). rates : (n, 3 F), back : (3 F, n). project : (F + n, n), pull : (n, F + n). bending : (n,).
+    torsion : (n, n). mass, spin : (n,), w rho and w alpha. scale : (3,). near : |r'| from which on there is a heading.
+    """
+
+    bends: NDArray
+    rates: NDArray
+    back: NDArray
+    project: NDArray
+    pull: NDArray
+    bending: NDArray
+    torsion: NDArray
+    mass: NDArray
+    spin: NDArray
+    scale: NDArray
+    shift: complex
+    radius: float
+    near: float
+    unit: bool
+
+
+class Frame(NamedTuple):
+    """C. e : (s, n) and t : (s, n), 1/sqrt(w (alpha + rho |e|^2)), at the nodes. finer : (s, 3, F), e'', 2 e', e."""
+
+    e: NDArray
+    t: NDArray
+    finer: NDArray
+
+
+class Work(NamedTuple):
+    """xy : (2 s, n), rows x and y of each stage. line : (2 s, n + 3 F). omega : (s, n). rates : (s, 3 F). moves : (2 s, F + n)."""
+
+    xy: NDArray
+    line: NDArray
+    omega: NDArray
+    rates: NDArray
+    moves: NDArray
+
+
+@part
+def blank(rod, s):
+    """A frame and the work of `s` stages."""
+    n, finer = rod.bends.shape[0], rod.rates.shape[1]
+    c = Frame(np.empty((s, n), np.complex128), np.empty((s, n)), np.empty((s, 3, finer // 3), np.complex128))
+    work = Work(
+        np.empty((2 * s, n)),
+        np.empty((2 * s, n + finer)),
+        np.empty((s, n)),
+        np.empty((s, finer)),
+        np.empty((2 * s, finer // 3 + n)),
+    )
+    return c, work
+
+
+@part
+def frame(rod, work, q, c):
+    """C at configurations q (s, 3, n); returns the least |r'|."""
+    s, _, n = q.shape
+    points, least = c.finer.shape[2], np.inf
+    for i in range(s):
+        for k in range(n):
+            work.xy[2 * i, k], work.xy[2 * i + 1, k] = q[i, 0, k], q[i, 1, k]
+    np.dot(work.xy, rod.bends, work.line)
+    for i in range(s):
+        x, y = work.line[2 * i], work.line[2 * i + 1]
+        for k in range(n):
+            e = complex(x[k], y[k]) + rod.shift
+            length = np.sqrt(e.real * e.real + e.imag * e.imag)
+            least = min(least, length)
+            e *= 1j * (rod.radius / length if rod.unit else rod.radius)
+            c.e[i, k] = e
+            c.t[i, k] = 1 / np.sqrt(rod.spin[k] + rod.mass[k] * (e.real * e.real + e.imag * e.imag))
+        for f in range(points):
+            at, first, second = n + f, n + points + f, n + 2 * points + f
+            slope = complex(x[at], y[at]) + rod.shift
+            bend, bent = complex(x[first], y[first]), complex(x[second], y[second])
+            if rod.unit:  # z/|z| = exp(i phi) with phi' = Im(z'/z)
+                square = slope.real * slope.real + slope.imag * slope.imag
+                inverse = slope.conjugate() * (1 / square)
+                log = bend * inverse
+                rate, turning = log.imag, (bent * inverse - log * log).imag
+                slope *= 1 / np.sqrt(square)
+                bend, bent = 1j * rate * slope, complex(-rate * rate, turning) * slope
+            ir = 1j * rod.radius
+            c.finer[i, 0, f], c.finer[i, 1, f], c.finer[i, 2, f] = ir * bent, 2 * ir * bend, ir * slope
+    return least
+
+
+@part
+def settle(hi, lo, q):
+    """q = hi + lo, (1, 3, n)."""
+    for row in range(3):
+        for k in range(q.shape[2]):
+            q[0, row, k] = hi[row, k] + lo[row, k]
+
+
+@part
+def forward(rod, work, c, p, v):
+    """v = C p, (s, 3, n)."""
+    s, n = p.shape
+    points = c.finer.shape[2]
+    omega, moves = work.omega, work.moves
+    for i in range(s):
+        t = c.t[min(i, c.t.shape[0] - 1)]
+        for k in range(n):
+            omega[i, k] = t[k] * p[i, k]
+    np.dot(omega, rod.rates, work.rates)
+    for i in range(s):
+        one = min(i, c.t.shape[0] - 1)
+        e, finer, rates = c.e[one], c.finer[one], work.rates[i]
+        for f in range(points):
+            move = finer[0, f] * rates[f] + finer[1, f] * rates[points + f] + finer[2, f] * rates[2 * points + f]
+            moves[2 * i, f], moves[2 * i + 1, f] = move.real, move.imag
+        for k in range(n):
+            move = e[k] * omega[i, k]
+            moves[2 * i, points + k], moves[2 * i + 1, points + k] = move.real, move.imag
+    np.dot(moves, rod.project, work.xy)
+    for i in range(s):
+        for k in range(n):
+            v[i, 0, k], v[i, 1, k], v[i, 2, k] = work.xy[2 * i, k], work.xy[2 * i + 1, k], omega[i, k]
+
+
+@part
+def force(rod, work, q, c, pull):
+    """pull = C^T grad V at configurations q (s, 3, n)."""
+    s, _, n = q.shape
+    points, p = c.finer.shape[2], pull.reshape(s, n)
+    for i in range(s):
+        for k in range(n):
+            work.xy[2 * i, k], work.xy[2 * i + 1, k] = rod.bending[k] * q[i, 0, k], rod.bending[k] * q[i, 1, k]
+            work.omega[i, k] = q[i, 2, k]
+    np.dot(work.xy, rod.pull, work.moves)
+    for i in range(s):
+        x, y, fine = work.moves[2 * i], work.moves[2 * i + 1], work.rates[i]
+        for j in range(3):
+            finer = c.finer[i, j]
+            for f in range(points):
+                fine[j * points + f] = finer[f].real * x[f] + finer[f].imag * y[f]
+    np.dot(work.rates, rod.back, p)
+    np.dot(work.omega, rod.torsion, work.xy[:s])
+    for i in range(s):
+        x, y, e = work.moves[2 * i], work.moves[2 * i + 1], c.e[i]
+        for k in range(n):
+            p[i, k] += e[k].real * x[points + k] + e[k].imag * y[points + k] + work.xy[i, k]
+            p[i, k] *= c.t[i, k]
+
+
+@part
+def stiffness(rod, c, out):
+    """out = C^T (grad^2 V) C, (n, n), of one configuration."""
+    n, points = rod.bends.shape[0], c.finer.shape[2]
+    moves, weighed = np.zeros((2 * n, points + n)), np.empty((n, 2 * n))
+    for k in range(n):
+        for f in range(points):
+            move = c.finer[0, 0, f] * rod.rates[k, f] + c.finer[0, 1, f] * rod.rates[k, points + f]
+            move += c.finer[0, 2, f] * rod.rates[k, 2 * points + f]
+            moves[2 * k, f], moves[2 * k + 1, f] = move.real, move.imag
+        moves[2 * k, points + k], moves[2 * k + 1, points + k] = c.e[0, k].real, c.e[0, k].imag
+    xy = np.dot(moves, rod.project).reshape(n, 2 * n)
+    for k in range(n):
+        for j in range(n):
+            weighed[k, j], weighed[k, n + j] = xy[k, j] * rod.bending[j], xy[k, n + j] * rod.bending[j]
+    np.dot(weighed, xy.T, out)
+    for k in range(n):
+        for j in range(n):
+            out[k, j] = c.t[0, k] * (out[k, j] + rod.torsion[k, j]) * c.t[0, j]
+
+
+@part
+def energy(rod, q, pi):
+    """Kinetic and potential energy at q (3, n)."""
+    twice = 0.0
+    for k in range(pi.size):
+        twice += pi[k] * pi[k] + rod.bending[k] * (q[0, k] * q[0, k] + q[1, k] * q[1, k])
+        for j in range(pi.size):
+            twice += q[2, k] * rod.torsion[k, j] * q[2, j]
+    return 0.5 * twice
+
+
+@part
+def mixed(base, weights, parts, h, out):
+    """out[i] = base[0] + h sum_j weights[i, j] parts[j], (s, rows, n)."""
+    s, rows, n = out.shape
+    for i in range(s):
+        for row in range(rows):
+            to = out[i, row]
+            for k in range(n):
+                to[k] = base[0, row, k]
+            for j in range(parts.shape[0]):
+                x, factor = parts[j, row], h * weights[i, j]
+                for k in range(n):
+                    to[k] += factor * x[k]
+
+
+@part
+def factor(stiff, g, matrix):
+    """matrix = (I + g C^T (grad^2 V) C)^-1, complex."""
+    n = len(stiff)
+    for i in range(n):
+        for k in range(n):
+            matrix[i, k] = g * stiff[i, k]
+        matrix[i, i] += 1
+    found = np.linalg.inv(matrix)
+    for i in range(n):  # assigning the whole would take as long to compile as all the rest
+        for k in range(n):
+            matrix[i, k] = found[i, k]
+
+
+@part
+def correct(inverse, into, out, rest, x, y, change):
+    """Add to `change` the solution for `rest` (s, n) along one eigenvector of the tableau and its conjugate."""
+    for k in range(x.size):
+        x[k] = 0.0
+        for i in range(len(rest)):
+            x[k] += into[i] * rest[i, k]
+    np.dot(inverse, x, y)
+    for i in range(len(rest)):
+        for k in range(x.size):
+            change[i, k] += (out[i] * y[k]).real
+
+
+@part
+def within(moves, h, scale):
+    """Whether h moves (s, 3, n) are nowhere larger than `scale` (3,)."""
+    for i in range(moves.shape[0]):
+        for row in range(3):
+            for k in range(moves.shape[2]):
+                if not abs(h * moves[i, row, k]) <= scale[row]:
+                    return False
+    return True
+
+
+@kernel
+def gauss(rod, hi, lo, pi, tableau, h, steps, sweeps, tolerance, bound):
+    """Steps from hi + lo (3, n) and pi (1, n), in place; the tableau, `discs.integrators.gauss`, has an even number of stages.
+
+    Returns (taken, sweeps). Stops before a step that does not converge or whose energy is not below `bound`, and after one in which
+    |r'| is not above `rod.near`.
+    """
+    a, b, last, _, _, _, pairs, pairs_in, pairs_out = tableau
+    s, n = b.size, pi.shape[1]
+    stages, work = blank(rod, s)
+    common, single = blank(rod, 1)
+    base, middle, v1 = np.empty((1, 3, n)), np.empty((1, 3, n)), np.empty((1, 3, n))
+    q, v, moves = np.empty((s, 3, n)), np.empty((s, 3, n)), np.empty((s, 3, n))
+    p, pull, change, rest = np.empty((s, n)), np.empty((s, 1, n)), np.empty((s, n)), np.empty((s, 1, n))
+    stiff, inverse = np.empty((n, n)), np.empty((pairs.size, n, n), np.complex128)
+    x, y = np.empty(n, np.complex128), np.empty(n, np.complex128)
+    half, weights, scale = np.full((1, 1), 0.5), b.reshape(1, s), tolerance * rod.scale
+    before, total = (np.empty((3, n)), np.empty((3, n)), np.empty((1, n))), 0
+    settle(hi, lo, base)
+    frame(rod, single, base, common)
+    for step in range(steps):
+        copy(hi, before[0])
+        copy(lo, before[1])
+        copy(pi, before[2])
+        forward(rod, single, common, pi, v1)
+        mixed(base, half, v1, h, middle)
+        frame(rod, single, middle, common)
+        stiffness(rod, common, stiff)
+        for j in range(pairs.size):
+            factor(stiff, h * h * pairs[j] ** 2, inverse[j])
+        for i in range(s):
+            for k in range(n):
+                p[i, k] = pi[0, k]
+        forward(rod, work, common, p, v)
+        sweep, settled = 0, False
+        while sweep < sweeps and not settled:
+            sweep += 1
+            mixed(base, a, v, h, q)
+            frame(rod, work, q, stages)
+            forward(rod, work, stages, p, v)
+            mixed(base, a, v, h, q)
+            force(rod, work, q, stages, pull)
+            mixed(pi.reshape(1, 1, n), a, pull, -h, rest)
+            for i in range(s):
+                for k in range(n):
+                    rest[i, 0, k] -= p[i, k]
+                    change[i, k] = 0.0
+            for j in range(pairs.size):
+                correct(inverse[j], pairs_in[j], pairs_out[j], rest.reshape(s, n), x, y, change)
+            for i in range(s):
+                for k in range(n):
+                    p[i, k] += change[i, k]
+            forward(rod, work, stages, p, v)
+            forward(rod, work, common, change, moves)
+            settled = within(moves, 0.5 * h, scale)
+        total += sweep
+        mixed(np.zeros((1, 3, n)), weights, v, h, v1)
+        add(hi, lo, v1[0], 1.0)
+        for k in range(n):
+            start = pi[0, k]
+            for i in range(s):
+                pi[0, k] += last[i] * (p[i, k] - start)
+        settle(hi, lo, base)
+        least = frame(rod, single, base, common)
+        if (sweep == sweeps and tolerance > 0) or not energy(rod, base[0], pi[0]) <= bound:
+            copy(before[0], hi)
+            copy(before[1], lo)
+            copy(before[2], pi)
+            return step, total
+        if not least > rod.near:
+            return step + 1, total
+    return steps, total
