@@ -1,7 +1,7 @@
 """The integrators, by name."""
 
 from discs import checks
-from discs.integrators.base import Integrator, OneStep, Work
+from discs.integrators.base import FixedStep, Integrator, OneStep, Work
 from discs.integrators.composition import KahanLi6, Suzuki4
 from discs.integrators.gauss import Gauss4, Gauss6, Gauss8
 from discs.integrators.ivp import BDF, DOP853, LSODA, RK45, Radau
@@ -29,6 +29,7 @@ __all__ = [
     "METHODS",
     "RK4",
     "RK45",
+    "FixedStep",
     "Gauss4",
     "Gauss6",
     "Gauss8",
