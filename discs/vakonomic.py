@@ -122,4 +122,4 @@ def rolling_disc(
 
 def of_chain(problem: Problem) -> tuple[MechanicalSystem, NDArray, NDArray]:
     """A `Chain` or `SteeredChain` of a few discs with its initial q, v (rows*N,), in the order of `lagrange_dalembert`."""
-    return lagrange_dalembert(problem), *frames(problem)
+    return lagrange_dalembert(problem, dense=True), *frames(problem)
