@@ -8,11 +8,11 @@ import pytest
 from compare import lump, work_precision
 from compare.__main__ import main
 from compare.peers import reduced
-from compare.peers.reduced import Cutoff, Outcome, Peer
+from compare.peers.peer import Cutoff, Outcome, Peer
 from compare.precision import Row, WorkPrecision, ours, peers, reference
 from continuum import untwisting_rod
 from discs import Problem
-from discs.integrators.ivp import Reduced
+from discs.kernels import methods
 from tests.conftest import Model, uneven
 
 # a short motion: peers whose error is that of their tolerances come close
@@ -83,8 +83,8 @@ def test_times_at_equal_error():
 
 def scipy_alone(problem: Problem) -> list[Peer]:
     """SciPy's methods with the kernel that every chain shares, where peers have one compiled for theirs, which takes seconds."""
-    f = Reduced(problem.system, problem.system.kernel)
-    return reduced.scipy_peers(problem, reduced.Bound(problem, lambda t, y, out: out.__setitem__(..., f(t, y))))
+    chain = problem.system.kernel
+    return reduced.scipy_peers(problem, reduced.Bound(problem, lambda t, y, out: methods.reduced(chain, y, out)))
 
 
 def test_a_run_over_its_time_is_cut_off():
