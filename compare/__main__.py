@@ -12,7 +12,7 @@ from compare.outputs import fresh_files
 from compare.stability_table import Stability, kept, stability
 from continuum import steered_rod, untwisting_rod
 from continuum.files import read_scene
-from discs import SimulationError
+from discs import command_line
 
 LAWS = {
     "field": untwisting_rod,
@@ -41,7 +41,8 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--no-limits", action="store_true", help="of the default scene, leave out the discs with headings of their own")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
-    commands = p.add_subparsers(dest="command", metavar="COMMAND", title="commands (without one: the comparison above)")
+    p.set_defaults(run=run_main_job)
+    commands = p.add_subparsers(metavar="COMMAND", title="commands (without one: the comparison above)")
     add_precision(
         commands.add_parser("precision", help="speed against error beside other integrators", description=precision.__doc__)
     )
@@ -62,6 +63,7 @@ def add_report(p: argparse.ArgumentParser) -> None:
         "--tol", metavar="TOL", type=float, default=1e-4, help="largest error of the fields, length and rad (default: 1e-4)"
     )
     p.add_argument("--quiet", action="store_true", help="no progress bars")
+    p.set_defaults(run=run_report)
 
 
 def add_precision(p: argparse.ArgumentParser) -> None:
@@ -78,6 +80,7 @@ def add_precision(p: argparse.ArgumentParser) -> None:
     p.add_argument("--repeats", metavar="M", type=int, default=5, help="timed runs of each setting (default: 5)")
     p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run, s (default: 10)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
+    p.set_defaults(run=run_precision)
 
 
 def add_stability(p: argparse.ArgumentParser) -> None:
@@ -88,6 +91,7 @@ def add_stability(p: argparse.ArgumentParser) -> None:
     p.add_argument("--quick", action="store_true", help="small cases only: about a minute")
     p.add_argument("--seconds", metavar="S", type=float, help="longest time for one run, s (default: 60; quick: 1)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
+    p.set_defaults(run=run_stability)
 
 
 def run_stability(options: argparse.Namespace) -> None:
@@ -128,40 +132,29 @@ def run_precision(options: argparse.Namespace) -> None:
     print(f"\nwritten to {options.out}: precision.csv, precision.png, precision.md")
 
 
+def run_report(options: argparse.Namespace) -> None:
+    """Write everything on one page."""
+    report.report(options.out, options.n, options.tol, progress=not options.quiet)
+    print(f"written to {options.out}: report.html, report.md, pictures and their data")
+
+
+def run_main_job(options: argparse.Namespace) -> None:
+    """Compare discs with the field, and for the default scene show where discs with headings of their own tend."""
+    if options.scene and options.rolling:
+        raise ValueError("--rolling belongs to the default scene; a scene file says its own law with the key 'rolling'")
+    scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
+    with background() as executor:
+        studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor)
+        print(summary(studies))
+        print(f"\nwritten to {options.out}: convergence.csv, convergence.png, motion.png, energy.png\n", flush=True)
+        if not options.scene and not options.no_limits:
+            print(limits(options.out, not options.quiet, executor=executor))
+            print(f"\nwritten to {options.out}: headings.csv, limits.csv, locking.csv, limits.png")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
-    options = parser().parse_args(arguments)
-    try:
-        if options.command == "precision":
-            run_precision(options)
-            return 0
-        if options.command == "report":
-            report.report(options.out, options.n, options.tol, progress=not options.quiet)
-            print(f"written to {options.out}: report.html, report.md, pictures and their data")
-            return 0
-        if options.command == "stability":
-            run_stability(options)
-            return 0
-        if options.scene and options.rolling:
-            raise ValueError("--rolling belongs to the default scene; a scene file says its own law with the key 'rolling'")
-        scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
-        with background() as executor:
-            studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor)
-            print(summary(studies))
-            print(f"\nwritten to {options.out}: convergence.csv, convergence.png, motion.png, energy.png\n", flush=True)
-            if not options.scene and not options.no_limits:
-                print(limits(options.out, not options.quiet, executor=executor))
-                print(f"\nwritten to {options.out}: headings.csv, limits.csv, locking.csv, limits.png")
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except SimulationError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted; what is in the folder is whole", file=sys.stderr)
-        return 130
-    return 0
+    return command_line.main(parser(), arguments)
 
 
 if __name__ == "__main__":

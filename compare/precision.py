@@ -16,8 +16,8 @@ from tqdm import tqdm
 
 from compare import figures
 from compare.lump import lump
-from compare.peers import reduced
-from compare.peers.reduced import Cutoff, Outcome, Peer
+from compare.peers import multipliers, reduced
+from compare.peers.peer import Cutoff, Outcome, Peer
 from continuum import Scene
 from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, SimulationError, Suzuki4, checks, simulate
 
@@ -182,7 +182,7 @@ def peers(problem: Problem) -> list[Peer]:
     n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
     found = reduced.scipy_peers(problem, f)
     if find_spec("sksundae"):
-        found += [*reduced.sundials_peers(problem, f), reduced.multiplier_peer(problem)]
+        found += [*reduced.sundials_peers(problem, f), multipliers.multiplier_peer(problem)]
     if find_spec("diffrax") and problem.chain.ends == "springs":
         from compare.peers.in_jax import diffrax_peers
 
@@ -197,7 +197,7 @@ def peers(problem: Problem) -> list[Peer]:
 
         found += [mujoco_peer(problem), mujoco_peer(problem, second_order=False)]
     if n <= 128:
-        found.append(reduced.saddle_peer(problem))
+        found.append(multipliers.saddle_peer(problem))
     return found
 
 

@@ -9,10 +9,11 @@ from matplotlib.figure import Figure
 
 from discs import checks, poses
 from discs.chain import SteeredChain
+from discs.mechanics import Trajectory
 from discs.problem import Problem, State
 from discs.solution import Solution
 from discs.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED
-from discs.vakonomic import Motion, of_chain, rolling_disc, solve
+from discs.vakonomic import of_chain, rolling_disc, solve
 
 
 def given_or_new(ax: Axes | None, width: float, height: float) -> Axes:
@@ -211,7 +212,7 @@ def _chain(ax: Axes) -> None:
     ax.legend(fontsize=8, loc="upper right")
 
 
-def _paths(ax: Axes, run: Motion, label: str, colour: str) -> None:
+def _paths(ax: Axes, run: Trajectory, label: str, colour: str) -> None:
     """Paths of the discs, (x, y) of all of them first in q, and the chain at the first, middle and last frame."""
     x, y = run.q[:, :3], run.q[:, 3:6]
     ax.plot(x, y, color=colour, linewidth=0.8)

@@ -11,7 +11,7 @@ from discs.problem import Problem
 from discs.solution import Solution
 
 
-def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
+def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSystem:
     """Lagrange-d'Alembert for the discs of a problem, A the rows r. - e theta. and lambda the ground's forces.
 
     Coordinates are those of all discs row by row, (x_0 ... x_{n-1}, y_0 ..., theta_0 ..., and phi_0 ... with own headings), so that
@@ -20,6 +20,8 @@ def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
 
     Symmetries are the motions of the plane (those that a shifted ring allows) and turning all discs of a piece alike, a piece
     being discs that torsion springs join.
+
+    M and A are sparse arrays, or with `dense` plain ones, quicker for a few discs.
     """
     system, n = problem.system, problem.chain.n
     rows, m = len(system.rows), len(system.rows) * n
@@ -36,7 +38,14 @@ def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
         data = np.stack([np.full(2 * n, diagonal), -e.ravel()], axis=1).ravel()
         return scipy.sparse.csr_array((data, columns, starts), shape=(2 * n, m))
 
+    def filled(diagonal: float, e: NDArray) -> NDArray:
+        a = np.zeros((2 * n, m))
+        np.fill_diagonal(a, diagonal)
+        a[np.arange(2 * n), columns[1::2]] = -e.ravel()
+        return a
+
     moves, pieces = _moves(problem), _pieces(problem)
+    mass, rolling = (inertia.toarray(), filled) if dense else (inertia, entries)
 
     def symmetry(q: NDArray) -> NDArray:
         generators = np.zeros((moves + len(pieces), rows, n))
@@ -51,11 +60,11 @@ def lagrange_dalembert(problem: Problem) -> MechanicalSystem:
     return MechanicalSystem(
         tuple(f"{row} of disc {i}" for row in system.rows for i in range(n)),
         tuple(f"disc {i}" for i in range(n)) * 2,
-        lambda q: inertia,
+        lambda q: mass,
         lambda q: system.potential(shape(q)),
         lambda q, v: -system.gradient(shape(q)).ravel(),
-        lambda q: entries(1.0, system.contact(shape(q))),
-        lambda q, v: entries(0.0, system.contact_rate(shape(q), v.reshape(rows, n))),
+        lambda q: rolling(1.0, system.contact(shape(q))),
+        lambda q, v: rolling(0.0, system.contact_rate(shape(q), v.reshape(rows, n))),
         np.zeros(2 * n),
         symmetry,
     )

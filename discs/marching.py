@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from discs.integrators import Integrator, Work
+from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
 from discs.system import Phase, RollingDiscs
@@ -69,7 +69,7 @@ class March:
         self.problem, self.integrator, self.h = problem, integrator, h
         self.system, self.work, self.step = problem.system, Work(), 0
         self.kernel = self.system.kernel if compiled else None
-        self.compiled = self.kernel is not None and not integrator.adaptive
+        self.twin = integrator if self.kernel is not None and isinstance(integrator, FixedStep) else None  # steps compiled
         self.chunk = max(1, CHUNK // self.system.n)
         self.bound = problem.blown_up
         if problem.ill_posed:
@@ -91,8 +91,8 @@ class March:
         if not quiet:
             notice.start()
         try:
-            if self.compiled:
-                self.integrator.march(self.kernel, self.memory, self.h, 0, self.bound)
+            if self.twin is not None:
+                self.twin.march(self.kernel, self.memory, self.h, 0, self.bound)
             self.observe(self.frame(0.0))
         finally:
             notice.cancel()
@@ -114,7 +114,7 @@ class March:
     def to(self, step: int) -> Iterator[int]:
         """Go on to a step; yields how many steps were taken at a time."""
         while self.step < step:
-            taken = self._compiled(min(self.chunk, step - self.step)) if self.compiled else self._plain()
+            taken = self._plain() if self.twin is None else self._compiled(self.twin, min(self.chunk, step - self.step))
             self.step += taken
             yield taken
 
@@ -157,8 +157,8 @@ class March:
     def _gave_up(self, error: ArithmeticError) -> SimulationError:
         return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)
 
-    def _compiled(self, steps: int) -> int:
-        self.memory, tally = self.integrator.march(self.kernel, self.memory, self.h, steps, self.bound)
+    def _compiled(self, twin: FixedStep, steps: int) -> int:
+        self.memory, tally = twin.march(self.kernel, self.memory, self.h, steps, self.bound)
         self.work.add(tally)
         self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps)
         return tally.steps

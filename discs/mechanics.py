@@ -44,7 +44,10 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,)."""
+    """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,).
+
+    mu : (F, c), the charges of a vakonomic motion, see `discs.vakonomic`; None if it is nonholonomic.
+    """
 
     t: NDArray
     q: NDArray
@@ -52,6 +55,7 @@ class Trajectory:
     multipliers: NDArray
     energy: NDArray
     residual: NDArray
+    mu: NDArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,19 +198,30 @@ class MechanicalSystem:
             worst = self.names[int(np.argmax(np.abs(kernel @ directions[:, 0])))]
             raise ValueError(f"M must be positive on velocities that the constraints allow; there is no inertia against {worst}")
 
-    def accelerations(self, q: ArrayLike, v: ArrayLike) -> Motion:
-        """Accelerations and multipliers from the saddle point, sparse.
+    def magnetic(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+        """G of the vakonomic equations, (m, c): (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) v_k; see `discs.vakonomic`."""
+        q, v = self._vectors(q, v)
+        slopes = (self.constraint_rate(q, unit) for unit in np.eye(len(q)))
+        d = np.stack([a.toarray() if hasattr(a, "toarray") else a for a in slopes], axis=-1)  # dA_ak/dq_j
+        return (v @ d - d @ v).T
+
+    def accelerations(self, q: ArrayLike, v: ArrayLike, mu: ArrayLike | None = None) -> Motion:
+        """Accelerations and multipliers from the saddle point, sparse; nonholonomic without mu, vakonomic with mu.
 
         Parameters
         ----------
         q, v : (m,), coordinates and velocities; v obeys the constraints.
+        mu : (c,), charges, where mu. = -lambda.
 
         Raises
         ------
         ValueError : if constraints are redundant or contradict each other, naming their owners, or inertia is missing.
         """
         q, v = self._vectors(q, v)
-        return self._solve(q, self.force(q, v), -(self.constraint_rate(q, v) @ v))
+        f = self.force(q, v)
+        if mu is not None:
+            f = f + self.magnetic(q, v) @ checks.vector("mu", mu, len(self.owners))
+        return self._solve(q, f, -(self.constraint_rate(q, v) @ v))
 
     def consistent_velocity(self, q: ArrayLike, v: ArrayLike) -> NDArray:
         """The velocity u nearest to v that the constraints allow: A u = b and (u - v).M(u - v) least, (m,).
@@ -242,16 +257,28 @@ class MechanicalSystem:
         q, v = self._vectors(q, v)
         return 0.5 * float(v @ (self.mass(q) @ v)) + self.potential(q)
 
-    def integrate(self, q: ArrayLike, v: ArrayLike, times: ArrayLike, rtol: float = 1e-11) -> Trajectory:
+    def integrate(
+        self, q: ArrayLike, v: ArrayLike, times: ArrayLike, rtol: float = 1e-11, mu: ArrayLike | None = None
+    ) -> Trajectory:
         """The motion from q, v at times[0], by SciPy's DOP853 on v. from the saddle point; for small systems.
 
         Nothing pulls the velocity back to the constraint: `residual` shows how well the equations alone keep it.
 
+        Parameters
+        ----------
+        q, v : (m,), coordinates and velocities at times[0].
+        times : (F,), increasing.
+        rtol : tolerance of a step's error, relative to each coordinate.
+        mu : (c,), charges at times[0] of the vakonomic motion, see `discs.vakonomic`; without them it is nonholonomic.
+
         Raises
         ------
-        ValueError : if v does not obey the constraints, naming the worst owner.
+        ValueError : if v does not obey the constraints, naming the worst owner, and for arrays of a wrong shape.
+        RuntimeError : if the motion cannot be continued.
         """
         q, v = self._vectors(q, v)
+        checks.number("rtol", rtol, positive=True)
+        start = [q, v] if mu is None else [q, v, checks.vector("mu", mu, len(self.owners))]
         t = np.atleast_1d(np.asarray(times, dtype=float))
         if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
             raise ValueError("times must be at least two, increasing, the first that of q and v")
@@ -265,20 +292,24 @@ class MechanicalSystem:
         m = len(q)
 
         def rate(_: float, z: NDArray) -> NDArray:
-            return np.concatenate([z[m:], self.accelerations(z[:m], z[m:]).acceleration])
+            q, v, mu = np.split(z, [m, 2 * m])
+            found = self.accelerations(q, v, mu if mu.size else None)
+            return np.concatenate([v, found.acceleration, -found.multipliers[: mu.size]])
 
-        found = scipy.integrate.solve_ivp(rate, (t[0], t[-1]), np.concatenate([q, v]), "DOP853", t, rtol=rtol, atol=1e-3 * rtol)
+        found = scipy.integrate.solve_ivp(rate, (t[0], t[-1]), np.concatenate(start), "DOP853", t, rtol=rtol, atol=1e-3 * rtol)
         if not found.success:
-            raise ValueError(f"the motion could not be followed beyond t = {found.t[-1]:g}: {found.message}")
-        path, speed = found.y[:m].T, found.y[m:].T
+            raise RuntimeError(f"the motion cannot be continued beyond t = {found.t[-1]:g}: {found.message}")
+        path, speed, charges = np.split(found.y.T, [m, 2 * m], axis=1)
         frames = list(zip(path, speed, strict=True))
+        charged = frames if mu is None else zip(path, speed, charges, strict=True)
         return Trajectory(
             t,
             path,
             speed,
-            np.array([self.accelerations(*z).multipliers for z in frames]),
+            np.array([self.accelerations(*z).multipliers for z in charged]),
             np.array([self.energy(*z) for z in frames]),
             np.array([np.abs(self.residual(*z)).max() for z in frames]),
+            None if mu is None else charges,
         )
 
     def _vectors(self, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, NDArray]:

@@ -13,6 +13,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items):
+    """The lessons first, which take long, as do the tests of `compare` that follow: so no worker waits for another at the end."""
+    items.sort(key=lambda item: item.path.stem != "test_notebooks")
+
+
 class Model(NamedTuple):
     """Kind of ends, and of law: "field", "unit", "true" (unit law, true curvature, stretch) or "steered" (own headings)."""
 

@@ -19,7 +19,7 @@ import exudyn as exu
 import numpy as np
 from exudyn import itemInterface as items
 
-from compare.peers.reduced import Outcome, Peer
+from compare.peers.peer import Outcome, Peer
 from discs import Problem, Solution, State, SteeredChain
 
 UP, X, Y, HEADING, LEAN, ROLL = range(6)

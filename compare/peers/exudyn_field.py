@@ -30,7 +30,7 @@ import scipy.sparse as sp
 from exudyn import itemInterface as items
 from numpy.typing import NDArray
 
-from compare.peers.reduced import Cutoff, Outcome, Peer
+from compare.peers.peer import Cutoff, Outcome, Peer
 from discs import Chain, Problem, stencils
 
 STEPS = (45.0, 90.0, 180.0, 360.0, 720.0)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.peers.reduced import TOLERANCES, Cutoff, Outcome, Peer
+from compare.peers.peer import TOLERANCES, Cutoff, Outcome, Peer
 from discs import Chain, Problem
 
 

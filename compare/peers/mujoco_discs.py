@@ -38,7 +38,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from compare.peers.reduced import Cutoff, Outcome, Peer
+from compare.peers.peer import Cutoff, Outcome, Peer
 from discs import Chain, Problem
 from discs.step import suggest_dt
 

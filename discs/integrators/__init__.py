@@ -3,7 +3,7 @@
 from functools import cache
 
 from discs import checks
-from discs.integrators.base import Integrator, OneStep, Work
+from discs.integrators.base import FixedStep, Integrator, OneStep, Work
 from discs.integrators.composition import KahanLi6, Suzuki4
 from discs.integrators.gauss import Gauss4, Gauss6, Gauss8
 from discs.integrators.ivp import BDF, DOP853, LSODA, RK45, Radau
@@ -37,6 +37,7 @@ __all__ = [
     "METHODS",
     "RK4",
     "RK45",
+    "FixedStep",
     "Gauss4",
     "Gauss6",
     "Gauss8",

@@ -51,7 +51,7 @@ class Frame(NamedTuple):
 
 
 class Integrator(ABC):
-    """A method of integration with a fixed step.
+    """A method of integration: of fixed steps, `FixedStep`, or of steps of its own choice.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Integrator(ABC):
     reference : where it comes from.
     stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
     offers : names of extra quantities it can report per frame, see `extras`.
-    adaptive : whether it chooses its own steps; then h is the longest it may take.
+    adaptive : whether it chooses its own steps; then h, in what follows, is the longest it may take.
     """
 
     name: ClassVar[str]
@@ -70,7 +70,7 @@ class Integrator(ABC):
     reference: ClassVar[str]
     stability_limit: ClassVar[float]
     offers: ClassVar[tuple[str, ...]] = ()
-    adaptive: ClassVar[bool] = False
+    adaptive: ClassVar[bool]
 
     @abstractmethod
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Any:
@@ -82,13 +82,6 @@ class Integrator(ABC):
     @abstractmethod
     def advance(self, system: RollingDiscs, memory: Any, h: float, work: Work) -> Any:
         """The memory one step h later."""
-
-    @abstractmethod
-    def march(self, chain: Any, memory: Any, h: float, steps: int, bound: float) -> tuple[Any, Tally]:
-        """The compiled twin of `steps` times `advance`, for the parameters `system.kernel` of a chain.
-
-        Stops after a step whose kinetic energy is not below `bound`, or in which a disc loses its heading.
-        """
 
     @abstractmethod
     def at(self, system: RollingDiscs, memory: Any, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
@@ -111,7 +104,20 @@ class Integrator(ABC):
         return {}
 
 
-class OneStep(Integrator):
+class FixedStep(Integrator):
+    """A method of equal steps, which has a compiled twin."""
+
+    adaptive: ClassVar[bool] = False
+
+    @abstractmethod
+    def march(self, chain: Any, memory: Any, h: float, steps: int, bound: float) -> tuple[Any, Tally]:
+        """The compiled twin of `steps` times `advance`, for the parameters `system.kernel` of a chain.
+
+        Stops after a step whose kinetic energy is not below `bound`, or in which a disc loses its heading.
+        """
+
+
+class OneStep(FixedStep):
     """A method whose step needs the state alone: the memory is the state, and frames are reached by a shorter step."""
 
     @abstractmethod

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators import solvers
-from discs.integrators.base import Frame, Integrator, Tally, Work
+from discs.integrators.base import Frame, Integrator, Work
 from discs.system import Phase, RollingDiscs
 
 
@@ -105,9 +105,6 @@ class SolveIvp(Integrator, ABC):
 
     def advance(self, system: RollingDiscs, memory: "Course", h: float, work: Work) -> "Course":
         return memory.to(memory.time + h, work)
-
-    def march(self, chain: Any, memory: "Course", h: float, steps: int, bound: float) -> tuple["Course", Tally]:
-        raise NotImplementedError("SciPy's methods are not compiled; their equations are")
 
     def at(self, system: RollingDiscs, memory: "Course", tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         z = memory.to(memory.time + tau, work) if tau else memory

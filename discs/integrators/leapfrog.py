@@ -5,7 +5,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from numpy.typing import NDArray
 
-from discs.integrators.base import Frame, Integrator, Tally, Work
+from discs.integrators.base import FixedStep, Frame, Tally, Work
 from discs.integrators.rk4 import RK4
 from discs.system import Phase, RollingDiscs, add
 
@@ -20,7 +20,7 @@ class TwoStep(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Leapfrog(Integrator):
+class Leapfrog(FixedStep):
     r"""Central differences in time with the constraint at n, the paper's section 4.3 ((discconstr1), (discconstr2)):
 
     M (q_{n+1} - 2 q_n + q_{n-1})/h^2 = -S q_n + A(q_n)^T lambda,   A(q_n) (q_{n+1} - q_{n-1}) = 0.

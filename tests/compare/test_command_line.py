@@ -8,7 +8,6 @@ import pytest
 
 from compare import overview
 from compare.__main__ import main
-from compare.limits import limits
 from compare.outputs import fresh_files
 from continuum import breathing_ring
 
@@ -30,12 +29,6 @@ def test_limits_are_part_of_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("compare.__main__.limits", lambda out, *_, **__: f"limits of {out}")
     assert main(["--out", str(tmp_path), "--n", "9", "17", "--tol", "1e-3", "--quiet"]) == 0
     assert f"limits of {tmp_path}" in capsys.readouterr().out
-
-
-def test_limits_write_their_files(tmp_path):
-    text = limits(tmp_path, progress=False, n=(9, 17), tol=1e-6)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["headings.csv", "limits.csv", "limits.png", "locking.csv"]
-    assert "unit law, true curvature" in text
 
 
 def test_steered_scene(tmp_path, capsys):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from compare import convergence, lump
-from compare.limits import locking, towards_unit_law
 from compare.study import write_csv
 from continuum import breathing_ring, solve, untwisting_rod
 
@@ -70,12 +69,3 @@ def test_lump():
     for field in (early, solve(scene, method="leapfrog", progress=False)):
         with pytest.raises(ValueError, match=r"field must be solve\(scene, tol\) of this scene up to t = 4.5, with an error"):
             convergence(scene, (9, 17), field=field, progress=False)
-
-
-def test_limits_of_own_headings():
-    """G -> infinity, J = 1/G tends to the unit law with true curvature like 1/G; A = G -> infinity locks."""
-    unit = towards_unit_law((40.0, 160.0))
-    assert unit.rate == pytest.approx(-1.0, abs=0.15), unit.distance
-    assert unit.distance[-1].max() < 4e-3
-    reach = locking((1e2, 1e4))
-    assert np.log(reach[1] / reach[0]) / np.log(100) == pytest.approx(-0.2, abs=0.02)

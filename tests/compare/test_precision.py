@@ -8,10 +8,11 @@ import pytest
 from compare import lump, work_precision
 from compare.__main__ import main
 from compare.peers import reduced
-from compare.peers.reduced import Cutoff, Outcome, Peer
+from compare.peers.peer import Cutoff, Outcome, Peer
 from compare.precision import Row, WorkPrecision, ours, peers, reference
 from continuum import untwisting_rod
 from discs import Problem
+from discs.kernels import methods
 from tests.conftest import Model, uneven
 
 # a short motion: peers whose error is that of their tolerances come close
@@ -80,19 +81,26 @@ def test_times_at_equal_error():
     assert "| p | 8 | 1e-04 | a | 2e+03 ms | b | 1.6e+04 ms | 8 |" in study.speedups()
 
 
+def scipy_alone(problem: Problem) -> list[Peer]:
+    """SciPy's methods with the kernel that every chain shares, where peers have one compiled for theirs, which takes seconds."""
+    chain = problem.system.kernel
+    return reduced.scipy_peers(problem, reduced.Bound(problem, lambda t, y, out: methods.reduced(chain, y, out)))
+
+
 def test_a_run_over_its_time_is_cut_off():
-    problem = lump(untwisting_rod(), 65)
-    f = reduced.Bound(problem)
     with pytest.raises(Cutoff):
-        reduced.scipy_peers(problem, f)[0].run(1e-6, 0.01)
+        scipy_alone(lump(untwisting_rod(), 65))[0].run(1e-6, 0.01)
 
 
-def test_command_line(tmp_path, capsys):
+def test_command_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("compare.precision.peers", scipy_alone)  # the others: see above
     out = tmp_path / "out"
     arguments = ["precision", "--n", "9", "--laws", "field", "--repeats", "1", "--seconds", "0.5", "--quiet", "--out", str(out)]
     assert main(arguments) == 0
     assert sorted(p.name for p in out.iterdir()) == ["precision.csv", "precision.md", "precision.png"]
-    assert "fastest peer" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "fastest peer" in printed
+    assert "SciPy DOP853" in printed
     assert (out / "precision.csv").read_text().startswith("problem,n,method,ours,setting,error,seconds")
     assert main(["precision", "--n", "9", "--repeats", "0", "--quiet", "--out", str(out)]) == 2
     assert "repeats must be a whole number" in capsys.readouterr().err

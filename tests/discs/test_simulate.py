@@ -273,7 +273,8 @@ def test_ground_force_along_a_run(name, model):
     """lambda = rho w r.. + dV/dr, r.. by differences of the recorded velocity: second order in the frames' spacing."""
     problem = uneven(7, model)
     times = np.array([0.5 - 1e-3, 0.5, 0.5 + 1e-3])
-    run = simulate(problem, name, 0.0025, frames=times, want=("contact_force", "velocity"), progress=False)
+    long = METHODS[name].order > 2 and METHODS[name].stability_limit == np.inf  # steps that err as little
+    run = simulate(problem, name, 0.02 if long else 0.0025, frames=times, want=("contact_force", "velocity"), progress=False)
     system = problem.system
     q = np.stack([getattr(run, row)[1] for row in system.rows])
     mass, gradient = system.weights[0], system.gradient(system.shape(q))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from discs import textbook
+from discs import oscillators, textbook
 
 DISC = {"mass": 1.3, "spin_inertia": 0.6, "heading_inertia": 0.4, "radius": 0.7}
 CLOSED = {
@@ -65,11 +65,11 @@ def test_famous_answers():
 
 
 def contact():
-    return textbook.contact_oscillator(**OSCILLATOR, driver_stiffness=2.1, width=0.7, **START, drift=0.9)
+    return oscillators.contact_oscillator(**OSCILLATOR, driver_stiffness=2.1, width=0.7, **START, drift=0.9)
 
 
 def driven(skew):
-    return textbook.driven_oscillator(**OSCILLATOR, wave=0.5, skew=skew, **START, drift=1.9)
+    return oscillators.driven_oscillator(**OSCILLATOR, wave=0.5, skew=skew, **START, drift=1.9)
 
 
 def harmonic(t):
@@ -161,6 +161,6 @@ def test_bad_parameters_are_refused():
     with pytest.raises(ValueError, match=r"velocity\[1\] must not be 0"):
         textbook.nonholonomic_particle(1.0, 1.0, y=0.0, velocity=(1.0, 0.0))
     with pytest.raises(ValueError, match=r"drift must be above 0.*in size for the driver to go round; got 0.1"):
-        textbook.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, **START, drift=0.1)
+        oscillators.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, **START, drift=0.1)
     with pytest.raises(ValueError, match="q must be 3 finite numbers"):
-        textbook.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, q=(1, 2), speed=1.0, drift=3.0)
+        oscillators.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, q=(1, 2), speed=1.0, drift=3.0)

@@ -1,0 +1,38 @@
+"""What a peer is: settings from loose to tight, and what a run with one of them costs and gives."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from numpy.typing import NDArray
+
+
+class Cutoff(Exception):
+    """A run took longer than it was given."""
+
+
+class Outcome(NamedTuple):
+    """Where a peer ended: positions (rows, n), its steps, right-hand sides, linear solves or factorisations (None: not told),
+    seconds, momenta where it has them."""
+
+    q: NDArray
+    steps: int
+    gradients: int
+    solves: int | None
+    seconds: float
+    pi: NDArray | None = None
+
+
+class Peer(NamedTuple):
+    """A peer with its settings, from loose to tight.
+
+    name : as in the table. settings : its tolerances or steps. run : (setting, seconds it is given) -> Outcome. tells : how it
+    differs.
+    """
+
+    name: str
+    settings: tuple[float, ...]
+    run: Callable[[float, float], Outcome]
+    tells: str = ""
+
+
+TOLERANCES = tuple(10.0**-k for k in range(2, 12))
