@@ -128,13 +128,20 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
         start = processor()
         return simulate(problem, integrator, h, frames, progress=False), processor() - start
 
+    def foretold(integrator: str | Integrator, h: float) -> float:
+        """The whole from its beginning: 32 steps, and more until they take a twentieth of a second or are a hundredth of it."""
+        steps, whole = 32, problem.duration / h
+        for attempt in range(20):  # the first may compile kernels
+            part = replace(problem, duration=min(steps * h, problem.duration))
+            _, taken = timed(part, integrator, h, 1)
+            if attempt and (taken > 0.05 or 100 * steps >= whole):
+                break
+            steps *= 4 if attempt else 1
+        return taken * max(whole / steps, 1.0)
+
     def run(integrator: str | Integrator, h: float, times: NDArray) -> Solution:
-        """A hundredth foretells the whole: the faster of two, as kernels may be compiled, unless it is a few fast steps."""
-        part, left = replace(problem, duration=problem.duration / 100), seconds - sum(cost)
-        (tried, once), (_, again) = timed(part, integrator, h, 1), timed(part, integrator, h, 1)
-        fastest = min(once, again)
-        if 100 * fastest > left and (fastest > 0.1 or tried.stats["steps"] > 20):
-            raise Slow(100 * fastest)
+        if (expected := foretold(integrator, h)) > seconds - sum(cost):
+            raise Slow(expected)
         found, taken = timed(problem, integrator, h, times)
         cost.append(taken)
         return found
@@ -154,7 +161,7 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
             says = _told([*heard, error])
             return Found("stopped", getattr(error, "time", np.nan), dt or np.nan, seconds=spent(), says=says), None
         except Slow as error:
-            return Found("cut off", dt=dt or np.nan, seconds=error.seconds, says="foretold by a hundredth of it, not run"), None
+            return Found("cut off", dt=dt or np.nan, seconds=error.seconds, says="foretold from its beginning, not run"), None
     drift = float(np.abs(done.energy / done.energy[0] - 1).max())
     says = _told(heard)
     slip = float(done.rolling_residual.max()) if done.rolling_residual is not None else np.nan

@@ -30,10 +30,10 @@ from compare.precision import work_precision
 from compare.stability_table import stability
 from compare.study import Study, convergence
 from continuum import Scene, solve, untwisting_rod
-from discs import Problem, Solution, checks
-from discs.style import BLUE, GREEN, ORANGE
+from discs import Problem, Solution, checks, poses
 
 SIZES = (17, 33, 65, 129, 257)
+FRAMES = 97  # of the fields, among them the instants of their pictures
 LAWS = {"field": "the paper's law, ṙ = RωJr'", "unit": "true rolling, ṙ = RωJr'/|r'|"}
 PACKAGES = ("numpy", "scipy", "matplotlib", "numba", "scikit-sundae", "rolling-discs")
 
@@ -134,7 +134,7 @@ def report(
         energies = beside.submit(energy_runs, first)
         later = {law: _studied(scene, sizes, tol, beside) for law, scene in scenes.items()}
         stage("the scene and its motion")
-        fields = {law: solve(scene, tol, frames=INSTANTS, progress=False) for law, scene in scenes.items()}
+        fields = {law: solve(scene, tol, frames=FRAMES, progress=False) for law, scene in scenes.items()}
         _scene(page, scenes["field"])
         _motion(page, scenes, fields)
         stage("N to infinity")
@@ -178,12 +178,14 @@ def _motion(page: Page, scenes: dict[str, Scene], fields: dict[str, Solution]) -
         error = max(run.error_estimate[f] for f in ("x", "y", "theta")) if run.error_estimate else np.nan
         rows = [
             (t, s, run.x[f, i], run.y[f, i], run.theta[f, i])
-            for f, t in enumerate(run.t)
+            for f, t in ((f, run.t[f]) for f in poses.instants(run, INSTANTS))
             for i, s in enumerate(run.s)
             if i % max(1, run.s.size // 128) == 0
         ]
         caption = f"The field under the {law} law, off by {error:.1e} at most by its own estimate."
-        page.figure(f"motion_{law}", figures.motion(run, scenes[law]), caption, ("t", "s", "x", "y", "theta"), rows)
+        page.figure(
+            f"motion_{law}", figures.motion(run, scenes[law], instants=INSTANTS), caption, ("t", "s", "x", "y", "theta"), rows
+        )
 
 
 def _limit(page: Page, studies: dict[str, list[Study]]) -> None:
@@ -201,16 +203,10 @@ def _laws(page: Page, fields: dict[str, Solution]) -> None:
     distance = np.array(
         [np.abs(getattr(a, f)[:, :: every[0]] - getattr(b, f)[:, :: every[1]]).max(axis=1) for f in ("x", "y", "theta")]
     )
-    ax = Figure(figsize=(6.8, 4.0), layout="constrained").subplots()
-    for name, row, colour in zip(("x", "y", "θ"), distance, (ORANGE, BLUE, GREEN), strict=True):
-        ax.plot(a.t, row, "o-", label=name, color=colour)
-    ax.set_xlabel("time t")
-    ax.set_ylabel("largest distance (length, rad)")
-    ax.legend()
-    ax.grid(alpha=0.3)
     page.add("## The paper's law against true rolling", "They agree while |r'| = 1, and the model lets |r'| drift.")
     rows = [(f"{t:g}", *(f"{d:.3g}" for d in at)) for t, at in zip(a.t, distance.T, strict=True)]
-    page.figure("laws", ax, "Distance between the two fields.", ("t", "x", "y", "theta"), rows)
+    caption = "The two fields: their distance, and their lines, with the motion's data above."
+    page.figure("laws", figures.laws(fields, distance, INSTANTS)[0], caption, ("t", "x", "y", "theta"), rows)
 
 
 def _energy(page: Page, runs: dict[str, Solution], scene: Scene) -> None:
