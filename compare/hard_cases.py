@@ -61,14 +61,14 @@ def cases(quick: bool = False) -> list[Case]:
 
     for rolling in ("field", "unit"):
         for n in (33,) if quick else (33, 129):
-            words = "growth of every wave, to the shortest, within 0.05 of the dispersion relation" + "; none" * (rolling == "unit")
+            words = "growth of every wave, to the shortest, within 0.02 of the dispersion relation" + "; none" * (rolling == "unit")
             what = "under the field law all waves grow, up to ω√(β/K); under the unit law none does"
             run = partial(waves, n, rolling, 0.7, 4.0)
             add(
                 f"rolling straight rod, {rolling} law",
                 f"N = {n}",
                 what,
-                bound(words, error=0.05, must=(*CONSERVING, *GAUSS)),
+                bound(words, error=0.02, must=(*CONSERVING, *GAUSS)),
                 run,
                 methods=FIXED,
             )
@@ -100,7 +100,13 @@ def cases(quick: bool = False) -> list[Case]:
         run = partial(motion, partial(twisted, 65 if quick else 129, twist=float(turns)), note=folding)
         what = "64 and 1024 times the paper's energy: fast, strongly folded"
         words = "energy to 1e-10; an error above 10 % not without a word"
-        add("strong twist", f"{turns} turns, N = {65 if quick else 129}", what, bound(words, energy=1e-10, must=CONSERVING), run)
+        add(
+            "strong twist",
+            f"{turns} turns, N = {65 if quick else 129}",
+            what,
+            bound(words, energy=1e-10, must=CONSERVING, aloud=True),
+            run,
+        )
     for n in (65,) if quick else (65, 513):
         what = "every wave the chain holds is excited, most far above what a step resolves"
         words = "energy to 1e-10"
@@ -111,7 +117,7 @@ def cases(quick: bool = False) -> list[Case]:
         what = "parameters at their limits: no spin inertia, no torsion, hardly bent or hardly bending, tiny or huge discs"
         words = "energy to 1e-9; an error above 10 % not without a word"
         run = partial(motion, partial(lumped, scene, 33, **keywords))
-        add("extreme parameters", setting, what, bound(words, energy=1e-9, must=CONSERVING), run)
+        add("extreme parameters", setting, what, bound(words, energy=1e-9, must=CONSERVING, aloud=True), run)
 
     # after 7/8 of a period a wrong frequency shows; midpoint, h < t/100, is off by omega^3 h^2 t/12 < 1.4e-3 in phase
     run = partial(motion, partial(twisted, 33, radius=0.0, duration=7.8), exact=torsion_wave)

@@ -106,7 +106,7 @@ def rolling_waves(
         xi = -i (R omega c/sigma) eta,   R vartheta = (1 - (R omega c/sigma)^2) eta:
 
     started so, a wave only grows. (Under the unit law eta = R vartheta, and it only oscillates, at the rate Omega.) Its amplitude
-    is A^2 = |xi|^2 + |eta|^2 + R^2 |vartheta|^2 + R^2 |vartheta.|^2/Omega^2, which an oscillation keeps; the rate is the logarithm
+    is A^2 = |xi|^2 + |eta|^2 + R^2 |vartheta|^2 + 2 R^2 |vartheta.|^2/Omega^2, which an oscillation keeps; the rate is the logarithm
     of the ratio of the largest A in the two halves of the run, over half its time. Waves of 1e-9 feel neither each other nor
     rounding.
     """
@@ -126,7 +126,7 @@ def rolling_waves(
     found, run = march(problem, method, None if method in EXPLICIT else multiple * k, seconds)
     if run is None:
         return found, None
-    turn = rod.radius / frequency(rod, q, k)
+    turn = 2**0.5 * rod.radius / frequency(rod, q, k)
     rows = (run.x - problem.chain.s, run.y, rod.radius * run.theta)
     parts = np.array([np.fft.rfft(row, axis=1)[:, modes] for row in (*rows, run.omega)])
     parts[3] *= turn

@@ -60,6 +60,7 @@ class Expectation:
     must : methods of ours that must keep to it. The others may stop, or say that steps did not converge or a warning: what no
         method may do is to be lost without a word.
     says : what every run of ours must say, in a warning or an error.
+    aloud : whether `must` is about the energy only, and an error above the bound has to be said by them as by the others.
     """
 
     kind: str
@@ -68,6 +69,7 @@ class Expectation:
     error: float = np.inf
     must: tuple[str, ...] = ()
     says: str = ""
+    aloud: bool = False
 
     def verdict(self, method: str, found: Found) -> str:
         """ "holds", "says so" (off, and not silently), "lost", or the outcome of a run that was not done."""
@@ -87,7 +89,9 @@ class Expectation:
             return False
         if self.kind == "must refuse":
             return verdict in ("refused", "stopped")
-        return verdict == "holds" if method in self.must else verdict not in ("lost", "refused")
+        if method in self.must:
+            return verdict == "holds" or (self.aloud and verdict == "says so" and found.energy <= self.energy)
+        return verdict not in ("lost", "refused")
 
 
 @lru_cache(2)

@@ -154,6 +154,11 @@ def test_verdicts():
     assert refuse.met("midpoint", good) is False
     assert refuse.met("midpoint", Found("stopped")) is True
     assert exact.met("rk4", Found("refused")) is False
+    aloud = Expectation("bound", "", energy=1e-10, error=0.1, must=("midpoint",), aloud=True)
+    wrong = good._replace(error=0.9)
+    assert [aloud.met("midpoint", f) for f in (good, wrong, wrong._replace(unconverged=1))] == [True, False, True]
+    assert aloud.met("midpoint", Found("done", energy=1e-9, error=0.9, unconverged=1)) is False
+    assert exact.met("midpoint", wrong._replace(unconverged=1)) is False
     told = Expectation("must refuse", "", says="heading")
     assert told.met("rk4", Found("stopped", says="a disc lost its heading")) is True
     assert told.met("rk4", Found("stopped", says="values are not finite")) is False
