@@ -185,9 +185,9 @@ def precision(study: "WorkPrecision") -> list[Axes]:
     return list(grid.ravel())
 
 
-def stability(study: "Stability", growth: "Growth | None") -> list[Axes]:
-    """Energy error against h/k for each method, crosses where it stopped or was not converged, and the growth of waves on the
-    straight rolling rod."""
+def stability(study: "Stability", growth: "dict[str, Growth]") -> list[Axes]:
+    """Energy error against h/k for each method, crosses where steps were not converged, nothing where it stopped, and the growth
+    of waves on the straight rolling rod by law."""
     figure = Figure(figsize=(11.5, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     rows = [row for row in study.rows if row.case == "step above the explicit limit"]
@@ -203,17 +203,20 @@ def stability(study: "Stability", growth: "Growth | None") -> list[Axes]:
         left.loglog([m for m, _ in said], [d for _, d in said], "x", color=colour, markersize=9)
     left.set_xlabel("h/k")
     left.set_ylabel("relative error of the energy")
-    left.set_title(f"paper's scene, {settings[-1] if settings else ''}; × some steps unconverged", fontsize="medium")
+    left.set_title(f"paper's scene, {settings[-1] if settings else ''}; × steps unconverged, no point: stopped", fontsize="medium")
+    left.set_xticks([1, 2, 4, 8, 16, 32, 64], minor=False)
+    left.xaxis.set_major_formatter(ScalarFormatter())
+    left.xaxis.set_minor_formatter(NullFormatter())
     left.grid(alpha=0.3)
     if rows:
         left.legend(fontsize=8)
-    if growth is not None:
-        right.plot(growth.q, growth.relation, "-", color=GREY, label="dispersion relation, 33 discs")
-        right.plot(growth.q, growth.measured, "o", color=BLUE, markersize=4, label="measured, midpoint")
+    for (law, waves), colour, mark in zip(growth.items(), (ORANGE, BLUE), "os", strict=False):
+        right.plot(waves.q, waves.relation, "-", color=colour, label=f"{law} law, dispersion relation of 33 discs")
+        right.plot(waves.q, waves.measured, mark, color=colour, markersize=4, label=f"{law} law, measured, midpoint")
+    if growth:
         right.legend(fontsize=8)
     right.set_xlabel("wave number q")
     right.set_ylabel("growth rate σ")
-    right.set_ylim(bottom=0)
-    right.set_title("straight rod rolling under the field law", fontsize="medium")
+    right.set_title("straight rod rolling", fontsize="medium")
     right.grid(alpha=0.3)
     return [left, right]

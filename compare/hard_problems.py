@@ -106,9 +106,9 @@ def rolling_waves(
         xi = -i (R omega c/sigma) eta,   R vartheta = (1 - (R omega c/sigma)^2) eta:
 
     started so, a wave only grows. (Under the unit law eta = R vartheta, and it only oscillates, at the rate Omega.) Its amplitude
-    is A^2 = |xi|^2 + |eta|^2 + R^2 |vartheta|^2 + 2 R^2 |vartheta.|^2/Omega^2, which an oscillation keeps; the rate is the logarithm
-    of the ratio of the largest A in the two halves of the run, over half its time. Waves of 1e-9 feel neither each other nor
-    rounding.
+    is A^2 = |xi|^2 + |eta|^2 + R^2 |vartheta|^2 + 2 R^2 |vartheta.|^2/Omega^2, which an oscillation keeps; the rate is the
+    logarithm of the ratio of the largest A in the two halves of the run, over half its time. Waves of 1e-9 feel neither each
+    other nor rounding.
     """
     scene = rolling_rod(rolling=rolling, duration=duration, bending_stiffness=stiffness, radius=0.7, density=1.3, spin_inertia=0.6)
     problem, rod = lump(scene, n), scene.rod

@@ -49,6 +49,9 @@ body {{ font: 16px/1.5 sans-serif; max-width: 62rem; margin: 2rem auto; padding:
 img {{ max-width: 100%; }}
 table {{ border-collapse: collapse; display: block; overflow-x: auto; font-size: 0.8rem; margin: 1rem 0; }}
 th, td {{ border: 1px solid #ccc; padding: 0.2rem 0.5rem; text-align: left; white-space: nowrap; }}
+table:has(th:nth-child(12)) {{ width: max-content; max-width: 96vw; font-size: 0.65rem;
+  position: relative; left: 50%; transform: translateX(-50%); }}
+table:has(th:nth-child(12)) :is(th, td) {{ padding: 0.1rem 0.25rem; }}
 strong {{ color: #b00; }}
 h1 strong, h2 strong {{ color: inherit; }}
 </style>
@@ -168,7 +171,7 @@ def _scene(page: Page, scene: Scene) -> None:
         "let go.",
         "## The scene",
         table(("quantity", "value"), values),
-        f"Time runs to {scene.duration:g}. {'; '.join(f'{law} law: {words}' for law, words in LAWS.items())}.",
+        f"Time runs to {scene.duration:g}. The laws of rolling: {'; '.join(f'{law}, {words}' for law, words in LAWS.items())}.",
     )
 
 
@@ -234,12 +237,11 @@ def _stability(page: Page, executor: Executor, progress: bool) -> None:
     found = stability(quick=True, executor=executor, progress=progress)
     found.save(page.folder / "report_stability_runs.csv")
     drawn = found.plot()
-    waves = found.waves
     page.add("## Hard cases", "Small ones; `python -m compare stability` runs all.", found.summary(), found.words, found.grid())
     page.add("All runs: [report_stability_runs.csv](report_stability_runs.csv).")
-    rows = zip(waves.q, waves.relation, waves.measured, strict=True) if waves else ()
-    caption = "Energy at steps far above the explicit limit, and growing waves."
-    page.figure("stability", drawn[0], caption, ("q", "growth by the relation", "growth measured"), rows)
+    rows = [(law, *row) for law, w in found.waves.items() for row in zip(w.q, w.relation, w.measured, strict=True)]
+    caption = "Energy at steps far above the explicit limit, with all runs above, and growing waves."
+    page.figure("stability", drawn[0], caption, ("law", "q", "growth by the relation", "growth measured"), rows)
 
 
 def _machine(page: Page) -> None:

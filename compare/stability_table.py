@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,7 +72,7 @@ class Stability:
         for row in self.rows:
             f = row.found
             numbers = [_short(v) for v in (f.t, f.dt, f.error, f.energy, f.residual)]
-            says = " ".join(part for part in (f.note, f.says) if part).replace("\n", " ").replace("|", "\\|")
+            says = "; ".join(part for part in (f.note, _first(f.says)) if part).replace("|", "\\|")
             cells = [
                 f"{row.case}: {row.setting}",
                 row.method,
@@ -81,7 +82,7 @@ class Stability:
                 str(f.unconverged),
                 str(f.steps),
             ]
-            lines.append(f"| {' | '.join([*cells, _short(f.seconds), says[:160]])} |")
+            lines.append(f"| {' | '.join([*cells, _short(f.seconds), says])} |")
         return "\n".join(lines)
 
     def summary(self) -> str:
@@ -91,7 +92,8 @@ class Stability:
         for row in self.failures:
             f = row.found
             how = f"{row.verdict}, error {_short(f.error)}, energy {_short(f.energy)}"
-            lines.append(f"* {row.case}, {row.setting}, `{row.method}`: {how} {f.note} {f.says[:120]}".rstrip())
+            parts = "; ".join(part for part in (how, f.note, _first(f.says)) if part)
+            lines.append(f"* {row.case}, {row.setting}, `{row.method}`: {parts}")
         return "\n".join(lines)
 
     @property
@@ -121,9 +123,10 @@ class Stability:
             writer.writerows([*row[:-1], *row.found] for row in self.rows)
 
     @cached_property
-    def waves(self) -> Growth | None:
-        """Growth on the straight rod rolling under the field law, by midpoint, for the figure."""
-        return rolling_waves(33, "field", 0.7, 4.0, "midpoint", np.inf)[1]
+    def waves(self) -> dict[str, Growth]:
+        """Growth on the rolling straight rod under both laws, by midpoint, for the figure."""
+        found = {law: rolling_waves(33, law, 0.7, 4.0, "midpoint", np.inf)[1] for law in ("field", "unit")}
+        return {law: growth for law, growth in found.items() if growth is not None}
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
@@ -208,6 +211,11 @@ def _wanted(case: Case) -> str:
     everyone = e.kind == "must refuse" or set(case.methods) & set(OURS) <= set(e.must)
     who = "all of ours" if everyone else "; ".join(filter(None, (", ".join(e.must), "no other lost without a word")))
     return f"* **{case.name}**: {case.what}{'' if case.what.endswith('?') else '.'} {e.kind.capitalize()} ({who}): {e.words}."
+
+
+def _first(says: str, most: int = 160) -> str:
+    """The beginning of a message, on one line."""
+    return shorten(says, most, placeholder=" ...")
 
 
 def _short(value: float) -> str:
