@@ -135,9 +135,9 @@ def report(
         page, sizes = Page(folder), tuple(n)
         first = replace(scenes["field"], duration=long * scenes["field"].duration)
         energies = beside.submit(energy_runs, first)
-        later = {law: _studied(scene, sizes, tol, beside) for law, scene in scenes.items()}
         stage("the scene and its motion")
         fields = {law: solve(scene, tol, frames=FRAMES, progress=False) for law, scene in scenes.items()}
+        later = {law: _studied(scene, sizes, fields[law], beside) for law, scene in scenes.items()}
         _scene(page, scenes["field"])
         _motion(page, scenes, fields)
         stage("N to infinity")
@@ -156,8 +156,8 @@ def report(
         (folder / "report.html").write_text(page.html(title), encoding="utf-8")
 
 
-def _studied(scene: Scene, n: tuple[int, ...], tol: float, executor: Executor) -> list[Future[Study]]:
-    return [executor.submit(convergence, scene, n, ends, tol=tol, progress=False) for ends in ("springs", "consistent")]
+def _studied(scene: Scene, n: tuple[int, ...], field: Solution, executor: Executor) -> list[Future[Study]]:
+    return [executor.submit(convergence, scene, n, ends, field, progress=False) for ends in ("springs", "consistent")]
 
 
 def _scene(page: Page, scene: Scene) -> None:
