@@ -74,7 +74,7 @@ def test_waves_grow_as_the_relation_says():
     for law, n, stiffness, time_, bound in (
         ("field", 33, 0.7, 4.0, 0.005),
         ("field", 17, 0.0, 20 / 17, 0.005),
-        ("unit", 17, 0.7, 4.0, 0.005),
+        ("unit", 33, 0.7, 4.0, 1e-4),  # where none grows, amplitudes are kept
     ):
         _, waves = rolling_waves(n, law, stiffness, time_, "gauss6", np.inf, 0.1)
         rod = rolling_rod(bending_stiffness=stiffness, radius=0.7, density=1.3, spin_inertia=0.6).rod
