@@ -68,22 +68,22 @@ def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
     return ax
 
 
-def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
-    """The paper's figure of the motion: at each frame the centre line and the director d_3 = cos(theta) e_z + sin(theta) J d_1.
+def motion(run: Solution, scene: Scene, arrows: int = 24, instants: int = 5) -> Figure:
+    """The paper's figure of the motion: at some instants the centre line and the director d_3 = cos(theta) e_z + sin(theta) J d_1.
 
     The last panel shows all of them from above.
     """
-    columns = 3
-    rows = -(-(len(run.t) + 1) // columns)
-    figure = Figure(figsize=(3.3 * columns, 2.9 * rows), layout="constrained")
-    lines = [np.stack([run.x[f], run.y[f]]) for f in range(len(run.t))]
+    columns, frames = 3, poses.instants(run, instants)
+    rows = -(-(len(frames) + 1) // columns)
+    figure = Figure(figsize=(4.0 * columns, 3.4 * rows), layout="constrained")
+    lines = [np.stack([run.x[f], run.y[f]]) for f in frames]
     if scene.closed:
         lines = [np.append(line, line[:, :1] + np.array(scene.shift)[:, None], axis=1) for line in lines]
     everything = np.concatenate(lines, axis=1)
     middle, reach = everything.mean(axis=1), np.ptp(everything, axis=1).max() / 2 * 1.1
     shown, sideways = poses.picked(run.s, arrows), poses.turn(poses.axles(run))
-    for f, (x, y) in enumerate(lines):
-        ax: Axes3D = figure.add_subplot(rows, columns, f + 1, projection="3d")
+    for panel, (f, (x, y)) in enumerate(zip(frames, lines, strict=True), 1):
+        ax: Axes3D = figure.add_subplot(rows, columns, panel, projection="3d")
         sine, cosine = np.sin(run.theta[f]), np.cos(run.theta[f])
         d3 = np.array([*(sideways[f] * sine), cosine])[:, shown]
         ax.plot(x, y, 0, color=BLUE, linewidth=2)
@@ -94,6 +94,30 @@ def motion(run: Solution, scene: Scene, arrows: int = 24) -> Figure:
     of_discs.motion(run, top, instants=len(lines))
     figure.suptitle(f"{scene.name}, {scene.rolling} law; arrows are the directors d₃")
     return figure
+
+
+def laws(runs: dict[str, Solution], distance: NDArray, instants: int = 5) -> list[Axes]:
+    """Two motions of the same rod: the distance between them, (fields, F), and their centre lines from above."""
+    (first, a), (second, b) = runs.items()
+    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for name, row, colour in zip(("x", "y", "theta"), distance, (ORANGE, BLUE, GREEN), strict=True):
+        left.plot(a.t, row, label=SYMBOL[name], color=colour)
+    left.set_xlabel("time t")
+    left.set_ylabel("largest distance (length, rad)")
+    left.legend()
+    frames = poses.instants(a, instants)
+    for f, shade in zip(frames, np.linspace(0.25, 1, frames.size), strict=True):
+        for run, law, colour, line in ((a, first, ORANGE, "-"), (b, second, BLUE, "--")):
+            right.plot(run.x[f], run.y[f], line, color=colour, alpha=shade, label=f"{law} law" if shade == 1 else None)
+        right.annotate(f"t = {a.t[f]:.2g}", (a.x[f, -1], a.y[f, -1]), fontsize=8, textcoords="offset points", xytext=(4, 0))
+    right.set_aspect("equal", adjustable="datalim")
+    right.set_xlabel("x")
+    right.set_ylabel("y")
+    right.legend()
+    for ax in (left, right):
+        ax.grid(alpha=0.3)
+    return [left, right]
 
 
 def _stage(ax: Axes3D, middle: NDArray, reach: float) -> None:
@@ -162,9 +186,9 @@ def precision(study: "WorkPrecision") -> list[Axes]:
     return list(grid.ravel())
 
 
-def stability(study: "Stability", growth: "Growth | None") -> list[Axes]:
-    """Energy error against h/k for each method, crosses where it stopped or was not converged, and the growth of waves on the
-    straight rolling rod."""
+def stability(study: "Stability", growth: "dict[str, Growth]") -> list[Axes]:
+    """Energy error against h/k for each method, crosses where steps were not converged, nothing where it stopped, and the growth
+    of waves on the straight rolling rod by law."""
     figure = Figure(figsize=(11.5, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     rows = [row for row in study.rows if row.case == "step above the explicit limit"]
@@ -180,17 +204,20 @@ def stability(study: "Stability", growth: "Growth | None") -> list[Axes]:
         left.loglog([m for m, _ in said], [d for _, d in said], "x", color=colour, markersize=9)
     left.set_xlabel("h/k")
     left.set_ylabel("relative error of the energy")
-    left.set_title(f"paper's scene, {settings[-1] if settings else ''}; × some steps unconverged", fontsize="medium")
+    left.set_title(f"paper's scene, {settings[-1] if settings else ''}; × steps unconverged, no point: stopped", fontsize="medium")
+    left.set_xticks([1, 2, 4, 8, 16, 32, 64], minor=False)
+    left.xaxis.set_major_formatter(ScalarFormatter())
+    left.xaxis.set_minor_formatter(NullFormatter())
     left.grid(alpha=0.3)
     if rows:
         left.legend(fontsize=8)
-    if growth is not None:
-        right.plot(growth.q, growth.relation, "-", color=GREY, label="dispersion relation, 33 discs")
-        right.plot(growth.q, growth.measured, "o", color=BLUE, markersize=4, label="measured, midpoint")
+    for (law, waves), colour, mark in zip(growth.items(), (ORANGE, BLUE), "os", strict=False):
+        right.plot(waves.q, waves.relation, "-", color=colour, label=f"{law} law, dispersion relation of 33 discs")
+        right.plot(waves.q, waves.measured, mark, color=colour, markersize=4, label=f"{law} law, measured, midpoint")
+    if growth:
         right.legend(fontsize=8)
     right.set_xlabel("wave number q (1/length)")
     right.set_ylabel("growth rate σ (1/time)")
-    right.set_ylim(bottom=0)
-    right.set_title("straight rod rolling under the field law", fontsize="medium")
+    right.set_title("straight rod rolling", fontsize="medium")
     right.grid(alpha=0.3)
     return [left, right]

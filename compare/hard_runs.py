@@ -1,11 +1,11 @@
 """How hard cases are run: what is expected of a method, what became of it, ours and peers'."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
-from time import perf_counter
+from time import thread_time as processor  # what else a machine does at the time changes no table
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from compare.peers import reduced
 from compare.precision import reference
-from discs import Problem, SimulationError, Solution, simulate
+from discs import Problem, SimulationError, Solution, simulate, suggest_dt
+from discs.integrators import Integrator
+from discs.tolerance import to_tolerance
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")
@@ -57,6 +59,8 @@ class Expectation:
     error : largest error of any method.
     must : methods of ours that must keep to it. The others may stop, or say that steps did not converge or a warning: what no
         method may do is to be lost without a word.
+    says : what every run of ours must say, in a warning or an error.
+    aloud : whether `must` is about the energy only, and an error above the bound has to be said by them as by the others.
     """
 
     kind: str
@@ -64,6 +68,8 @@ class Expectation:
     energy: float = LOOSE
     error: float = np.inf
     must: tuple[str, ...] = ()
+    says: str = ""
+    aloud: bool = False
 
     def verdict(self, method: str, found: Found) -> str:
         """ "holds", "says so" (off, and not silently), "lost", or the outcome of a run that was not done."""
@@ -79,9 +85,13 @@ class Expectation:
         verdict = self.verdict(method, found)
         if method not in OURS or verdict in ("cut off", "-"):
             return None
+        if self.says not in found.says:
+            return False
         if self.kind == "must refuse":
             return verdict in ("refused", "stopped")
-        return verdict == "holds" if method in self.must else verdict not in ("lost", "refused")
+        if method in self.must:
+            return verdict == "holds" or (self.aloud and verdict == "says so" and found.energy <= self.energy)
+        return verdict not in ("lost", "refused")
 
 
 @lru_cache(2)
@@ -103,59 +113,108 @@ def _known(make: Callable[[], Problem], exact: Callable[[Problem], NDArray] | No
     return q if floor < 1e-4 else None
 
 
+class Slow(Exception):
+    """A run would take longer than it is given: `seconds`, as foretold."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(seconds)
+        self.seconds = seconds
+
+
 def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tuple[Found, Solution | None]:
-    """A run of ours; one that is foretold to take longer than `seconds` is not begun."""
-    begun = perf_counter()
+    """A run of ours; one that is foretold to take longer than `seconds` is not begun, nor a further one of "auto"."""
+    begun, times = processor(), np.linspace(0.0, problem.duration, FRAMES)
 
     def spent() -> float:
-        return perf_counter() - begun
+        return processor() - begun
 
+    def timed(problem: Problem, integrator: str | Integrator, h: float, frames: int | NDArray) -> tuple[Solution, float]:
+        start = processor()
+        return simulate(problem, integrator, h, frames, progress=False), processor() - start
+
+    def foretold(integrator: str | Integrator, h: float) -> float:
+        """The whole from its beginning: 32 steps, and more until they take a twentieth of a second or are a hundredth of it."""
+        steps, whole = 32, problem.duration / h
+        for attempt in range(20):  # the first may compile kernels
+            part = replace(problem, duration=min(steps * h, problem.duration))
+            _, taken = timed(part, integrator, h, 1)
+            if attempt and (taken > 0.05 or 100 * steps >= whole):
+                break
+            steps *= 4 if attempt else 1
+        return taken * max(whole / steps, 1.0)
+
+    def run(integrator: str | Integrator, h: float, times: NDArray) -> Solution:
+        if (expected := foretold(integrator, h)) > seconds - sum(cost):
+            raise Slow(expected)
+        found, taken = timed(problem, integrator, h, times)
+        cost.append(taken)
+        return found
+
+    cost: list[float] = []
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         try:
             if method == "auto":
-                run = simulate(problem, "auto", tol=TOL, frames=FRAMES, progress=False)
+                done = to_tolerance(problem, "auto", TOL, times, run)
             else:
-                # a hundredth foretells the whole: the faster of two, as kernels may be compiled, unless it is a few fast steps
-                part = replace(problem, duration=problem.duration / 100)
-                tried = [simulate(part, method, dt, frames=1, progress=False).stats for _ in range(2)]
-                fastest = min(t["seconds"] for t in tried)
-                if 100 * fastest > seconds and (fastest > 0.1 or tried[0]["steps"] > 20):
-                    return Found("cut off", dt=tried[0]["dt"], seconds=100 * fastest, says="foretold, not run"), None
-                run = simulate(problem, method, dt, frames=FRAMES, progress=False)
+                dt = suggest_dt(problem, method) if dt is None else dt
+                done = run(method, dt, times)
         except ValueError as error:
             return Found("refused", 0.0, seconds=spent(), says=str(error)), None
         except (SimulationError, ArithmeticError) as error:
-            return Found("stopped", getattr(error, "time", np.nan), dt or np.nan, seconds=spent(), says=str(error)), None
-    drift = float(np.abs(run.energy / run.energy[0] - 1).max())
-    says = " ".join(dict.fromkeys(str(w.message) for w in heard))
-    slip = float(run.rolling_residual.max()) if run.rolling_residual is not None else np.nan
-    stats = run.stats
-    found = Found("done", run.t[-1], stats["dt"], np.nan, drift, slip, stats["unconverged"], stats["steps"], stats["seconds"], says)
-    return found, run
+            says = _told([*heard, error])
+            return Found("stopped", getattr(error, "time", np.nan), dt or np.nan, seconds=spent(), says=says), None
+        except Slow as error:
+            return Found("cut off", dt=dt or np.nan, seconds=error.seconds, says="foretold from its beginning, not run"), None
+    drift = float(np.abs(done.energy / done.energy[0] - 1).max())
+    says = _told(heard)
+    slip = float(done.rolling_residual.max()) if done.rolling_residual is not None else np.nan
+    stats = done.stats
+    return Found("done", done.t[-1], stats["dt"], np.nan, drift, slip, stats["unconverged"], stats["steps"], sum(cost), says), done
 
 
-def _peer(problem: Problem, name: str, seconds: float) -> tuple[Found, NDArray | None]:
+def _told(heard: Sequence[warnings.WarningMessage | Exception]) -> str:
+    """Warnings and errors, each once."""
+    return " ".join(dict.fromkeys(str(w.message) if isinstance(w, warnings.WarningMessage) else str(w) for w in heard))
+
+
+class Watched(reduced.Bound):
+    """The right-hand side of a peer, that notes the time t it has reached, and gives up a run that is over its time or will be:
+    one that so far was four times too slow at the beginning (a tenth of a second, or a thirtieth of its time), less later."""
+
+    def __init__(self, problem: Problem, seconds: float) -> None:
+        from discs.kernels import methods
+
+        chain = problem.system.kernel
+        super().__init__(problem, lambda t, y, out: methods.reduced(chain, np.ascontiguousarray(y), out))
+        self.duration, self.seconds, self.t, self.gave_up, self.begun = problem.duration, seconds, 0.0, "", processor()
+
+    def watch(self, t: float) -> None:
+        spent = processor() - self.begun
+        self.t, share = t, spent / self.seconds
+        if spent > max(0.1, self.seconds / 30) and (4 - 3 * share) * t < share * self.duration:
+            self.gave_up = f"after {spent:.2g} s, as it would need over {self.seconds:g} s"
+            raise reduced.Cutoff
+
+
+def peer(problem: Problem, name: str, seconds: float) -> tuple[Found, NDArray | None]:
     """A run of a peer, at its tolerance RTOL; the right-hand side is the compiled one for all chains, energy is that at the end."""
     if name.startswith("CVODE") and not find_spec("sksundae"):
         return Found("-", says="scikit-sundae is not installed"), None
-    from discs.kernels import methods
-
-    chain, system, begun = problem.system.kernel, problem.system, perf_counter()
-    f = reduced.Bound(problem, lambda t, y, out: methods.reduced(chain, np.ascontiguousarray(y), out))
+    system, f = problem.system, Watched(problem, seconds)
     found = reduced.sundials_peers(problem, f) if name.startswith("CVODE") else reduced.scipy_peers(problem, f)
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            end = next(p for p in found if p.name == name).run(RTOL, seconds)
-    except reduced.Cutoff:
-        return Found("cut off", seconds=perf_counter() - begun), None
-    except (ArithmeticError, RuntimeError, ValueError) as error:
-        return Found("failed", seconds=perf_counter() - begun, says=str(error)), None
+            end = next(p for p in found if p.name == name).run(RTOL, np.inf)
+    except (reduced.Cutoff, ArithmeticError, RuntimeError, ValueError) as error:
+        outcome, says = ("cut off", f.gave_up) if f.gave_up else ("failed", str(error))
+        return Found(outcome, f.t, seconds=processor() - f.begun, says=says), None
+    spent = processor() - f.begun
     pi = np.zeros(1) if end.pi is None else end.pi
     energy = 0.5 * float(np.vdot(pi, pi)) + system.potential(system.shape(end.q))
     drift = abs(energy / problem.energy() - 1)
-    return Found("done", problem.duration, energy=drift, residual=0.0, steps=end.steps, seconds=end.seconds), end.q
+    return Found("done", problem.duration, energy=drift, residual=0.0, steps=end.steps, seconds=spent), end.q
 
 
 def motion(
@@ -173,7 +232,7 @@ def motion(
     except ValueError as error:
         return Found("refused", 0.0, says=str(error))
     if method in PEERS:
-        found, q = _peer(problem, method, seconds)
+        found, q = peer(problem, method, seconds)
     else:
         found, run = march(problem, method, step(problem) if step else None, seconds)
         q = None if run is None else np.array([getattr(run, row)[-1] for row in problem.system.rows])

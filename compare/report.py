@@ -30,10 +30,10 @@ from compare.precision import work_precision
 from compare.stability_table import stability
 from compare.study import Study, convergence
 from continuum import Scene, solve, untwisting_rod
-from discs import Problem, Solution, checks
-from discs.style import BLUE, GREEN, ORANGE
+from discs import Problem, Solution, checks, poses
 
 SIZES = (17, 33, 65, 129, 257)
+FRAMES = 97  # of the fields, among them the instants of their pictures
 LAWS = {"field": "the paper's law, ṙ = RωJr'", "unit": "true rolling, ṙ = RωJr'/|r'|"}
 PACKAGES = ("numpy", "scipy", "matplotlib", "numba", "scikit-sundae", "rolling-discs")
 
@@ -49,6 +49,9 @@ body {{ font: 16px/1.5 sans-serif; max-width: 62rem; margin: 2rem auto; padding:
 img {{ max-width: 100%; }}
 table {{ border-collapse: collapse; display: block; overflow-x: auto; font-size: 0.8rem; margin: 1rem 0; }}
 th, td {{ border: 1px solid #ccc; padding: 0.2rem 0.5rem; text-align: left; white-space: nowrap; }}
+table:has(th:nth-child(12)) {{ width: max-content; max-width: 96vw; font-size: 0.65rem;
+  position: relative; left: 50%; transform: translateX(-50%); }}
+table:has(th:nth-child(12)) :is(th, td) {{ padding: 0.1rem 0.25rem; }}
 strong {{ color: #b00; }}
 h1 strong, h2 strong {{ color: inherit; }}
 </style>
@@ -132,9 +135,9 @@ def report(
         page, sizes = Page(folder), tuple(n)
         first = replace(scenes["field"], duration=long * scenes["field"].duration)
         energies = beside.submit(energy_runs, first)
-        later = {law: _studied(scene, sizes, tol, beside) for law, scene in scenes.items()}
         stage("the scene and its motion")
-        fields = {law: solve(scene, tol, frames=INSTANTS, progress=False) for law, scene in scenes.items()}
+        fields = {law: solve(scene, tol, frames=FRAMES, progress=False) for law, scene in scenes.items()}
+        later = {law: _studied(scene, sizes, fields[law], beside) for law, scene in scenes.items()}
         _scene(page, scenes["field"])
         _motion(page, scenes, fields)
         stage("N to infinity")
@@ -153,8 +156,8 @@ def report(
         (folder / "report.html").write_text(page.html(title), encoding="utf-8")
 
 
-def _studied(scene: Scene, n: tuple[int, ...], tol: float, executor: Executor) -> list[Future[Study]]:
-    return [executor.submit(convergence, scene, n, ends, tol=tol, progress=False) for ends in ("springs", "consistent")]
+def _studied(scene: Scene, n: tuple[int, ...], field: Solution, executor: Executor) -> list[Future[Study]]:
+    return [executor.submit(convergence, scene, n, ends, field, progress=False) for ends in ("springs", "consistent")]
 
 
 def _scene(page: Page, scene: Scene) -> None:
@@ -168,7 +171,7 @@ def _scene(page: Page, scene: Scene) -> None:
         "let go.",
         "## The scene",
         table(("quantity", "value"), values),
-        f"Time runs to {scene.duration:g}. {'; '.join(f'{law} law: {words}' for law, words in LAWS.items())}.",
+        f"Time runs to {scene.duration:g}. The laws of rolling: {'; '.join(f'{law}, {words}' for law, words in LAWS.items())}.",
     )
 
 
@@ -178,12 +181,14 @@ def _motion(page: Page, scenes: dict[str, Scene], fields: dict[str, Solution]) -
         error = max(run.error_estimate[f] for f in ("x", "y", "theta")) if run.error_estimate else np.nan
         rows = [
             (t, s, run.x[f, i], run.y[f, i], run.theta[f, i])
-            for f, t in enumerate(run.t)
+            for f, t in ((f, run.t[f]) for f in poses.instants(run, INSTANTS))
             for i, s in enumerate(run.s)
             if i % max(1, run.s.size // 128) == 0
         ]
         caption = f"The field under the {law} law, off by {error:.1e} at most by its own estimate."
-        page.figure(f"motion_{law}", figures.motion(run, scenes[law]), caption, ("t", "s", "x", "y", "theta"), rows)
+        page.figure(
+            f"motion_{law}", figures.motion(run, scenes[law], instants=INSTANTS), caption, ("t", "s", "x", "y", "theta"), rows
+        )
 
 
 def _limit(page: Page, studies: dict[str, list[Study]]) -> None:
@@ -201,16 +206,10 @@ def _laws(page: Page, fields: dict[str, Solution]) -> None:
     distance = np.array(
         [np.abs(getattr(a, f)[:, :: every[0]] - getattr(b, f)[:, :: every[1]]).max(axis=1) for f in ("x", "y", "theta")]
     )
-    ax = Figure(figsize=(6.8, 4.0), layout="constrained").subplots()
-    for name, row, colour in zip(("x", "y", "θ"), distance, (ORANGE, BLUE, GREEN), strict=True):
-        ax.plot(a.t, row, "o-", label=name, color=colour)
-    ax.set_xlabel("time t")
-    ax.set_ylabel("largest distance (length, rad)")
-    ax.legend()
-    ax.grid(alpha=0.3)
     page.add("## The paper's law against true rolling", "They agree while |r'| = 1, and the model lets |r'| drift.")
     rows = [(f"{t:g}", *(f"{d:.3g}" for d in at)) for t, at in zip(a.t, distance.T, strict=True)]
-    page.figure("laws", ax, "Distance between the two fields.", ("t", "x", "y", "theta"), rows)
+    caption = "The two fields: their distance, and their lines, with the motion's data above."
+    page.figure("laws", figures.laws(fields, distance, INSTANTS)[0], caption, ("t", "x", "y", "theta"), rows)
 
 
 def _energy(page: Page, runs: dict[str, Solution], scene: Scene) -> None:
@@ -238,12 +237,11 @@ def _stability(page: Page, executor: Executor, progress: bool) -> None:
     found = stability(quick=True, executor=executor, progress=progress)
     found.save(page.folder / "report_stability_runs.csv")
     drawn = found.plot()
-    waves = found.waves
     page.add("## Hard cases", "Small ones; `python -m compare stability` runs all.", found.summary(), found.words, found.grid())
     page.add("All runs: [report_stability_runs.csv](report_stability_runs.csv).")
-    rows = zip(waves.q, waves.relation, waves.measured, strict=True) if waves else ()
-    caption = "Energy at steps far above the explicit limit, and growing waves."
-    page.figure("stability", drawn[0], caption, ("q", "growth by the relation", "growth measured"), rows)
+    rows = [(law, *row) for law, w in found.waves.items() for row in zip(w.q, w.relation, w.measured, strict=True)]
+    caption = "Energy at steps far above the explicit limit, with all runs above, and growing waves."
+    page.figure("stability", drawn[0], caption, ("law", "q", "growth by the relation", "growth measured"), rows)
 
 
 def _machine(page: Page) -> None:

@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,7 +72,7 @@ class Stability:
         for row in self.rows:
             f = row.found
             numbers = [_short(v) for v in (f.t, f.dt, f.error, f.energy, f.residual)]
-            says = " ".join(part for part in (f.note, f.says) if part).replace("\n", " ").replace("|", "\\|")
+            says = "; ".join(part for part in (f.note, _first(f.says)) if part).replace("|", "\\|")
             cells = [
                 f"{row.case}: {row.setting}",
                 row.method,
@@ -81,7 +82,7 @@ class Stability:
                 str(f.unconverged),
                 str(f.steps),
             ]
-            lines.append(f"| {' | '.join([*cells, _short(f.seconds), says[:160]])} |")
+            lines.append(f"| {' | '.join([*cells, _short(f.seconds), says])} |")
         return "\n".join(lines)
 
     def summary(self) -> str:
@@ -91,7 +92,8 @@ class Stability:
         for row in self.failures:
             f = row.found
             how = f"{row.verdict}, error {_short(f.error)}, energy {_short(f.energy)}"
-            lines.append(f"* {row.case}, {row.setting}, `{row.method}`: {how} {f.note} {f.says[:120]}".rstrip())
+            parts = "; ".join(part for part in (how, f.note, _first(f.says)) if part)
+            lines.append(f"* {row.case}, {row.setting}, `{row.method}`: {parts}")
         return "\n".join(lines)
 
     @property
@@ -100,14 +102,16 @@ class Stability:
         return (
             "holds: to the end, energy (the number, relative) and where known positions within the bound. says so: off, with steps "
             "counted as unconverged or a warning. **LOST**: off, without a word. stops, refused: an error with time and disc, or "
-            "before the start. fails: a peer's error. cut off: too slow. †: some steps did not converge, and are counted. Bold: "
-            "not as expected of ours. "
-            f"auto runs to {TOL:g}, peers to rtol {RTOL:g}, their energy is that at the end; they keep rolling by their variables."
+            "before the start. fails: a peer's error. cut off: would take longer than it is given, as foretold from its beginning. "
+            "†: some steps did not converge, and are counted. ·: not run, as it would tell nothing: a tolerance hides waves and "
+            "rounding, and the parasitic mode is the two-step scheme's own. Bold: not as expected of ours. "
+            f"auto runs to {TOL:g}, peers to rtol {RTOL:g}, their energy is that at the end; they keep rolling by their variables. "
+            "Seconds are a processor's."
         )
 
     def report(self) -> str:
         """Everything, in Markdown."""
-        wants = dict.fromkeys(f"* **{c.name}**: {c.what}. {c.expectation.kind}: {c.expectation.words}." for c in self.cases)
+        wants = dict.fromkeys(_wanted(case) for case in self.cases)
         parts = ["# Hard cases", self.summary(), self.words, self.grid(), "## What is expected", "\n".join(wants), "## All runs"]
         return "\n\n".join([*parts, self.table()])
 
@@ -119,9 +123,10 @@ class Stability:
             writer.writerows([*row[:-1], *row.found] for row in self.rows)
 
     @cached_property
-    def waves(self) -> Growth | None:
-        """Growth on the straight rod rolling under the field law, by midpoint, for the figure."""
-        return rolling_waves(33, "field", 0.7, 4.0, "midpoint", np.inf)[1]
+    def waves(self) -> dict[str, Growth]:
+        """Growth on the rolling straight rod under both laws, by midpoint, for the figure."""
+        found = {law: rolling_waves(33, law, 0.7, 4.0, "midpoint", np.inf)[1] for law in ("field", "unit")}
+        return {law: growth for law, growth in found.items() if growth is not None}
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
@@ -145,10 +150,10 @@ def stability(
 
     Parameters
     ----------
-    quick : small cases only, for a minute.
+    quick : small cases only, less than a minute.
     names : of the cases, as `compare.hard_cases` has them; all by default.
     methods : names of ours and of peers; all by default.
-    seconds : a run that takes longer is cut off; 60, or 1 if quick.
+    seconds : of a processor; a run that is foretold to take longer is cut off; 60, or 1 if quick.
     executor : as for `sweep`; by default one process beside this one, so that times mean something.
     archive : file to keep results in, and to resume from.
     progress : show a progress bar.
@@ -198,6 +203,19 @@ def _listed(quick: bool) -> dict[str, Case]:
 def _run(order: dict[str, Any]) -> dict[str, Any]:
     """A run, in whatever process; cases are found by their names, as they cannot be sent as JSON."""
     return _listed(order["quick"])[order["case"]].run(order["method"], order["seconds"])._asdict()
+
+
+def _wanted(case: Case) -> str:
+    """What is expected, and of whom."""
+    e = case.expectation
+    everyone = e.kind == "must refuse" or set(case.methods) & set(OURS) <= set(e.must)
+    who = "all of ours" if everyone else "; ".join(filter(None, (", ".join(e.must), "no other lost without a word")))
+    return f"* **{case.name}**: {case.what}{'' if case.what.endswith('?') else '.'} {e.kind.capitalize()} ({who}): {e.words}."
+
+
+def _first(says: str, most: int = 160) -> str:
+    """The beginning of a message, on one line."""
+    return shorten(says, most, placeholder=" ...")
 
 
 def _short(value: float) -> str:

@@ -67,9 +67,14 @@ class Bound:
     def fill(self, t: float, y: NDArray, out: NDArray) -> None:
         """SUNDIALS' form. A failed callback is reported by the solver, not raised: NaN makes it stop."""
         self.calls += 1
-        if not self.calls & 63 and clock.perf_counter() > self.until:
-            raise Cutoff
+        if not self.calls & 63:
+            self.watch(t)
         self.f(t, y, out)
+
+    def watch(self, t: float) -> None:
+        """Stop a run that is over its time; t is where it is."""
+        if clock.perf_counter() > self.until:
+            raise Cutoff
 
     def __call__(self, t: float, y: NDArray) -> NDArray:
         """SciPy's form."""

@@ -78,25 +78,30 @@ QUARTER = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.0222662487959
 
 
 @part(inline="always")
+def whole(x):
+    """The whole number nearest to x, |x| < 2^51: `floor` and choices by it would keep loops from running several places at once."""
+    return (x + 6755399441055744.0) - 6755399441055744.0
+
+
+@part(inline="always")
 def turn(x):
     """cos x and sin x to a unit in the last place for |x| < 1e6, without a branch or a call, so that loops run several at once.
 
     Reduction by quarter turns in three parts and the minimax polynomials of fdlibm (Sun Microsystems, 1993).
     """
-    quarters = math.floor(x * (2 / math.pi) + 0.5)
+    quarters = whole(x * (2 / math.pi))
     r = ((x - quarters * QUARTER[0]) - quarters * QUARTER[1]) - quarters * QUARTER[2]
     z = r * r
     sin = r + r * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
     half = 0.5 * z
     rest = 1.0 - half
     cos = rest + (((1.0 - rest) - half) + z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
-    # one quarter turn takes (cos, sin) to (-sin, cos), two turn the signs
-    halves = math.floor(0.5 * quarters)
+    # one quarter turn takes (cos, sin) to (-sin, cos), one back to (sin, -cos), two turn the signs
+    halves = whole(0.5 * quarters)
     odd = quarters - 2.0 * halves
-    sign = 1.0 - 2.0 * (halves - 2.0 * math.floor(0.5 * halves))
-    first = -sin if odd > 0.5 else cos
-    second = cos if odd > 0.5 else sin
-    return sign * first, sign * second
+    sign = 1.0 - 2.0 * abs(halves - 2.0 * whole(0.5 * halves))
+    even, odd = sign * (1.0 - abs(odd)), sign * odd
+    return even * cos - odd * sin, even * sin + odd * cos
 
 
 @fill(chain.workspace, Steered, _nrt=True)

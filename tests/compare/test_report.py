@@ -33,7 +33,7 @@ def written(tmp_path_factory):
     """A small report, whole, in this process; stability and speed have tests of their own, with all methods and peers."""
     out = tmp_path_factory.mktemp("report")
     few = [c for c in cases(True) if c.name == "few discs" or c.setting.startswith("N = 33, h =")]
-    methods = ("midpoint", "gauss6", "leapfrog", "SciPy BDF")
+    methods = ("midpoint", "gauss6", "leapfrog", "SciPy DOP853")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "background", here)
         patch.setattr(module, "speed_peers", lambda problem: [])
