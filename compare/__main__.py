@@ -89,7 +89,9 @@ def add_stability(p: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", default="out", help="folder for stability.md, stability.csv, stability.png (default: out)"
     )
     p.add_argument("--quick", action="store_true", help="small cases only: less than a minute")
-    p.add_argument("--seconds", metavar="S", type=float, help="longest time for one run, s (default: 60; quick: 1)")
+    p.add_argument(
+        "--seconds", metavar="S", type=float, help="longest time for one run, s; for peers 2 at most (default: 60; quick: 1)"
+    )
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_stability)
 

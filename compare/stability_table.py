@@ -21,6 +21,7 @@ from compare.sweeps import Result, read, sweep
 from discs import checks
 
 SECONDS = {True: 1.0, False: 60.0}  # that a run may take: quick, or not
+PEER_SECONDS = 2.0  # peers are many, and slow
 MARK = {"holds": "holds", "says so": "says so", "lost": "LOST", "refused": "refused", "stopped": "stops", "failed": "fails"}
 
 
@@ -153,7 +154,7 @@ def stability(
     quick : small cases only, less than a minute.
     names : of the cases, as `compare.hard_cases` has them; all by default.
     methods : names of ours and of peers; all by default.
-    seconds : of a processor; a run that is foretold to take longer is cut off; 60, or 1 if quick.
+    seconds : of a processor; a run that is foretold to take longer is cut off; 60, or 1 if quick. Peers are given 2 at most.
     executor : as for `sweep`; by default one process beside this one, so that times mean something.
     archive : file to keep results in, and to resume from.
     progress : show a progress bar.
@@ -168,7 +169,7 @@ def stability(
     by = (*OURS, *PEERS) if methods is None else tuple(checks.choice("methods", m, (*OURS, *PEERS)) for m in methods)
     limit = SECONDS[quick] if seconds is None else checks.number("seconds", seconds, positive=True)
     listed = [case for case in listed if case.name in chosen]
-    todo = [_order(c, m, quick, limit) for c in listed for m in by if m in c.methods]
+    todo = [_order(c, m, quick, min(limit, PEER_SECONDS) if m in PEERS else limit) for c in listed for m in by if m in c.methods]
     with nullcontext(executor) if executor else background() as worker:
         return tabulated(sweep(_run, todo, worker, archive, progress), listed)
 

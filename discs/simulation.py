@@ -1,6 +1,7 @@
 """The one door to a run: `simulate(problem, method, ...)`."""
 
 import time as clock
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from discs.tolerance import to_tolerance
 WANTS = ("velocity", "slope", "contact_force")
 MOST_STEPS = 2.0**53
 ENGINES = ("compiled", "plain")
+LOST = 0.05  # of the energy: a run is warned of
 
 
 def simulate(
@@ -55,7 +57,7 @@ def simulate(
 
     Returns
     -------
-    Solution with exactly the frames asked for.
+    Solution with exactly the frames asked for. A warning says where more than a twentieth of the energy was lost or gained.
 
     Raises
     ------
@@ -76,11 +78,39 @@ def simulate(
             )
 
         def run(integrator: Integrator, dt: float, times: NDArray) -> Solution:
-            return simulate(problem, integrator, dt, times, want, progress, engine)
+            return _run(problem, integrator, dt, times, want, progress, engine, None)
 
         times = frame_times(frames, problem.duration)
-        return to_tolerance(problem, method, 1e-3 if tol is None else tol, times, run)
-    integrator = find(method)
+        found = to_tolerance(problem, method, 1e-3 if tol is None else tol, times, run)
+    else:
+        found = _run(problem, find(method), dt, frames, want, progress, engine, checkpoint)
+    _warn_of_lost_energy(problem, found)
+    return found
+
+
+def _warn_of_lost_energy(problem: Problem, run: Solution) -> None:
+    """Warn where a frame's energy says that the run is not the motion of the problem: H is constant."""
+    off = np.abs(run.energy - problem.energy())
+    worst = int(np.argmax(off))
+    if off[worst] > LOST * problem.blown_up / 10:
+        warnings.warn(
+            f"{run.stats['method']}: energy is conserved, but at t = {run.t[worst]:g} it is {run.energy[worst]:.3g} and not "
+            f'{problem.energy():.3g}: the run may not be trusted; take a smaller dt, or a method that keeps energy, as "midpoint"',
+            stacklevel=3,
+        )
+
+
+def _run(
+    problem: Problem,
+    integrator: Integrator,
+    dt: float | None,
+    frames: int | ArrayLike,
+    want: Iterable[str],
+    progress: bool,
+    engine: str,
+    checkpoint: str | Path | None,
+) -> Solution:
+    """One run; the arguments are those of `simulate`."""
     want = _wanted(want, integrator)
     compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None
     suggested = dt is None

@@ -19,7 +19,7 @@ LOOSE = 3e-4  # from here on "auto" takes the midpoint method
 FEWEST = 20  # steps to begin with
 PROBES = 33  # frames that runs are compared at
 SAFETY = 2.0  # steps are not yet small when errors are large: found by experiment
-ATTEMPTS = 14
+ATTEMPTS = 20
 
 
 def method_for(method: str | Integrator, tol: float) -> Integrator:
@@ -66,7 +66,7 @@ def to_tolerance(
     tol = checks.number("tol", tol, positive=True)
     integrator = method_for(method, tol)
     some = times if times.size <= PROBES else times[np.unique(np.linspace(0, times.size - 1, PROBES).round().astype(int))]
-    steps, last, failures, stalls, estimate = FEWEST, None, 0, 0, np.inf
+    steps, last, failure, stalls, estimate = FEWEST, None, None, 0, np.inf
     if np.isfinite(integrator.stability_limit):
         steps = max(steps, int(np.ceil(times[-1] / suggest_dt(problem, integrator))))
     rows = problem.system.rows
@@ -74,11 +74,10 @@ def to_tolerance(
         dt = times[-1] / steps
         try:
             found = run(integrator, dt, some)
-        except SimulationError:
-            failures += 1
-            if failures == 4:
-                raise
-            found = None
+        except SimulationError as error:
+            if failure and error.message == failure.message and abs(error.time - failure.time) < 0.02 * failure.time:
+                raise  # shorter steps end there too
+            found, failure = None, error
         if found is None or found.stats["unconverged"]:
             steps, last = 2 * steps, None
             continue
@@ -96,5 +95,7 @@ def to_tolerance(
             break
         growth = 2.0 if not np.isfinite(estimate) else float(np.clip(1.1 * (estimate / tol) ** 0.4, 1.3, 4.0))
         steps = int(np.ceil(growth * steps))
+    if failure and last is None:
+        raise failure
     what = f"tol = {tol:g} was not reached: the error is estimated at {estimate:.1e} with dt = {dt:g}"
     raise SimulationError(f"{what}; take a larger tol or another method", last.stats["steps"] if last else 0, times[-1], 0)
