@@ -43,7 +43,7 @@ def solve(
     The step of "suzuki4" is halved on the coarsest mesh until its effect is below a quarter of the tolerance; the effect is
     measured again on the finest mesh but one, and is part of the estimate.
 
-    "elements": for headings of their own (`SteeredRod`): spectral elements, halved until it no longer matters; see
+    "elements": for headings of their own (`SteeredRod`): spectral elements, more of them until it no longer matters; see
     `continuum.elements`.
 
     "leapfrog": the paper's explicit scheme on n points with step dt, both as in the paper (32, k^2/8) by default: plain

@@ -19,7 +19,7 @@ FINE = Suzuki4(Midpoint(tolerance=1e-13))
 
 @pytest.fixture(scope="module")
 def accurate():
-    return solve(steered_rod(), 1e-10, frames=3, progress=False)
+    return solve(steered_rod(), 1e-9, frames=3, progress=False)
 
 
 def test_lobatto_rule_is_exact_on_polynomials():
@@ -31,14 +31,29 @@ def test_lobatto_rule_is_exact_on_polynomials():
 
 
 def test_field_reaches_its_tolerance(accurate):
-    """1e-8 asked for: the estimate is below that, the error below the estimate."""
+    """1e-8 asked for: the error is below that, and the estimate is the error within a factor of five (and not below it)."""
     field = solve(steered_rod(), 1e-8, frames=3, progress=False)
-    every = (accurate.s.size - 1) // (field.s.size - 1)
+    every, other = (f.s.size - 1 for f in (accurate, field))
+    common = np.gcd(every, other)
     for name in ("x", "y", "theta", "phi", "omega", "phi_rate"):
-        error = np.abs(getattr(field, name) - getattr(accurate, name)[:, ::every]).max()
-        assert error <= field.error_estimate[name]
-        assert field.error_estimate[name] <= 1e-8 or name in ("omega", "phi_rate")
+        error = np.abs(getattr(field, name)[:, :: other // common] - getattr(accurate, name)[:, :: every // common]).max()
+        assert error <= field.error_estimate[name] <= 5 * error
+        assert error <= 1e-8 or name in ("omega", "phi_rate")
     np.testing.assert_allclose(accurate.energy, np.pi**4 / 80, rtol=1e-12)
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-5])
+def test_estimate_is_the_error(tol):
+    """On a scene that the estimate was not made for, against four times the elements."""
+    other = {"density": 0.8, "spin_inertia": 1.6, "torsion_stiffness": 1.4, "bending_stiffness": 1.7, "radius": 1.3, "length": 4.4}
+    scene = steered_rod(14.0, 5.0, 0.6, duration=3.0, twist=0.8, **other)
+    field = solve(scene, tol, frames=3, progress=False)
+    elements = Elements(scene, 8)
+    truth = np.stack([elements.sample(q, (field.s.size - 1) // 8) for q in elements.run(field.t, 1e-12)], axis=1)
+    for row, name in enumerate(("x", "y", "theta", "phi")):
+        error = np.abs(getattr(field, name) - truth[row]).max()
+        assert error <= tol
+        assert error <= field.error_estimate[name] <= 5 * error
 
 
 def test_field_is_the_limit_of_the_chain(accurate):
