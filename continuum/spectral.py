@@ -164,8 +164,9 @@ def solve_spectral(scene: Scene, tol: float, times: NDArray, progress: bool) -> 
             if worst(space) > tol / 2:
                 continue
             time, found = course.effect(n, steps), course.run(n, steps)
-            rest = course.tolerance * scene.rod.length  # of the sweeps
-            estimate = {name: space[name] + time[name] + rest for name in FIELDS}
+            unit = {"x": scene.rod.length, "y": scene.rod.length}
+            rest = {name: course.tolerance * unit.get(name, 1.0) for name in FIELDS}  # of the sweeps
+            estimate = {name: space[name] + time[name] + rest[name] for name in FIELDS}
             stats = {"method": "spectral", "order": None, "functions": n, "dt": scene.duration / steps, "steps": steps}
             return Solution(t=times, s=course.s, error_estimate=estimate, stats=stats, **found)
     raise ValueError(
