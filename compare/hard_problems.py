@@ -16,6 +16,7 @@ from continuum.exact import ring, standing_wave
 from continuum.scenes import SCENES
 from discs import Leapfrog, Problem, Solution, State
 from discs.marching import March
+from discs.simulation import lost_energy
 
 # Functions of arguments that can be sent to other processes
 
@@ -154,8 +155,8 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
     k, system, begun = problem.chain.k, problem.system, processor()
     h = k**2 / 8
     run = March(problem, Leapfrog(), h, True, True)
-    share, onset, energy = 0.0, np.nan, []
-    for t in np.linspace(0, duration, 401)[1:]:
+    share, onset, energy, times = 0.0, np.nan, [], np.linspace(0, duration, 401)[1:]
+    for t in times:
         for _ in run.to(round(t / h)):
             pass
         z = run.memory
@@ -168,7 +169,8 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
             return Found("cut off", t, h, steps=run.step, seconds=processor() - begun)
     drift = float(np.abs(np.array(energy) / problem.energy() - 1).max())
     note = f"off-constraint share up to {share:.2g}" + ("" if np.isnan(onset) else f", above 0.1 from t = {onset:.3g}")
-    return Found("done", duration, h, share, drift, steps=run.step, seconds=processor() - begun, note=note)
+    says = lost_energy(problem, method, times, np.array(energy))
+    return Found("done", duration, h, share, drift, steps=run.step, seconds=processor() - begun, says=says, note=note)
 
 
 def collapse(n: int, method: str, seconds: float) -> Found:

@@ -15,6 +15,7 @@ from compare.peers import reduced
 from compare.precision import reference
 from discs import Problem, SimulationError, Solution, simulate, suggest_dt
 from discs.integrators import Integrator
+from discs.simulation import LOST
 from discs.tolerance import to_tolerance
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
@@ -23,7 +24,7 @@ FIXED = (*CONSERVING, *GAUSS, *EXPLICIT)  # with steps and sweeps of their own: 
 OURS = (*FIXED, "auto")
 PEERS = ("SciPy Radau", "SciPy BDF", "SciPy DOP853", "CVODE BDF-5")
 TOL, RTOL = 1e-4, 1e-6  # of "auto", and of the peers
-LOOSE = 0.01  # a run is lost when its energy is off by more than this part
+LOOSE = LOST  # a run is lost when its energy is off by more than this part
 FRAMES = 101
 
 

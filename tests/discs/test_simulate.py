@@ -284,7 +284,7 @@ def test_ground_force_along_a_run(name, model):
 
 
 def test_lost_energy_is_said():
-    """The two-step scheme's parasitic mode takes over; a run that keeps within a twentieth says nothing."""
+    """The two-step scheme's parasitic mode takes over; a run that keeps its energy says nothing."""
     problem = semidiscretise(untwisting_rod(duration=60.0), 33, "springs")
     with pytest.warns(UserWarning, match=r"leapfrog: energy is conserved, but at t = .* the run may not be trusted"):
         simulate(problem, "leapfrog", progress=False)
