@@ -90,14 +90,14 @@ def simulate(
 
 
 def lost_energy(problem: Problem, method: str, t: NDArray, energy: NDArray) -> str:
-    """What to warn of where energies (F,) at times (F,) say that a run is not the motion of the problem; empty where all is well."""
+    """What to warn of where energies (F,) at times (F,) say that a run is not the motion it should be; empty where it may be."""
     off = np.abs(energy - problem.energy())
     worst = int(np.argmax(off))
     if off[worst] <= LOST * problem.blown_up / 10:
         return ""
     return (
-        f"{method}: energy is conserved, but at t = {t[worst]:g} it is {energy[worst]:.3g} and not {problem.energy():.3g}: the run may "
-        'not be trusted; take a smaller dt, or a method that keeps energy, as "midpoint"'
+        f"{method}: energy is conserved, but at t = {t[worst]:g} it is {energy[worst]:.3g} and not {problem.energy():.3g}: the run "
+        'may not be trusted; take a smaller dt, or a method that keeps energy, as "midpoint"'
     )
 
 

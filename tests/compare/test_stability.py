@@ -18,8 +18,8 @@ from continuum.scenes import rolling_rod
 from discs import simulate
 
 SMALL = cases(quick=True)
-# Runge and Kutta's scheme damps the waves it does not resolve; where a ring collapses McLachlan and Perlmutter's divides by zero and
-# stops, and names another cause
+# Runge and Kutta's scheme damps the waves it does not resolve; where a ring collapses McLachlan and Perlmutter's divides by zero
+# and stops, and names another cause
 FAILS = {
     ("rolling straight rod, unit law", "rk4"),
     ("collapsing ring, unit law", "mclachlan-perlmutter"),
