@@ -33,6 +33,7 @@ def settings(name: str):
 
 @models(COMPILED)
 @pytest.mark.parametrize("name", [name for name, cls in METHODS.items() if not cls.adaptive])
+@pytest.mark.filterwarnings("ignore:.*energy is conserved, but")  # one sweep of Gauss methods is not yet a step
 def test_twins_agree(name, model):
     least = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}[model.ends] - (
         model.law == "steered" and model.ends == "springs"
