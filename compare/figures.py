@@ -210,7 +210,7 @@ def stability(study: "Stability", growth: "dict[str, Growth]") -> list[Axes]:
     left.xaxis.set_minor_formatter(NullFormatter())
     left.grid(alpha=0.3)
     if rows:
-        left.legend(fontsize=8)
+        left.legend(fontsize=8, loc="upper left")
     for (law, waves), colour, mark in zip(growth.items(), (ORANGE, BLUE), "os", strict=False):
         right.plot(waves.q, waves.relation, "-", color=colour, label=f"{law} law, dispersion relation of 33 discs")
         right.plot(waves.q, waves.measured, mark, color=colour, markersize=4, label=f"{law} law, measured, midpoint")
