@@ -120,6 +120,7 @@ class March:
 
     def frame(self, tau: float) -> Frame:
         """The discs a time 0 <= tau < h after the last step."""
+        stuck = self.work.unconverged
         try:
             frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)
         except ArithmeticError as error:
@@ -127,7 +128,7 @@ class March:
         if tau:
             time = self.step * self.h + tau
             moved = Phase(frame.hi, frame.lo, frame.rate)
-            self._check_heading(self.system.lost_heading(self.memory, moved), self.step, time)
+            self._check_heading(self._lost(self.memory, moved, tau, self.work.unconverged > stuck), self.step, time)
             self._check_energy(self.system.kinetic(frame.rate), frame, self.step, time)
         return frame
 
@@ -146,13 +147,25 @@ class March:
         return dict(zip(system.rows, q, strict=True)) | {"omega": frame.rate[2], "energy": energy, "rolling_residual": slip}
 
     def _plain(self) -> int:
-        integrator, system, h = self.integrator, self.system, self.h
+        previous, stuck = self.memory, self.work.unconverged
         try:
-            previous, self.memory = self.memory, integrator.advance(system, self.memory, h, self.work)
+            self.memory = self.integrator.advance(self.system, previous, self.h, self.work)
         except ArithmeticError as error:
             raise self._gave_up(error) from None
-        self._check(system.lost_heading(previous, self.memory), self.step + 1)
+        self._check(self._lost(previous, self.memory, self.h, self.work.unconverged > stuck), self.step + 1)
         return 1
+
+    def _lost(self, before: Any, after: Any, h: float, stuck: bool) -> int | None:
+        """A disc that lost its heading in a step: on the straight way that it went, or that its velocity pointed.
+
+        The second where a step did not converge, so that where it leads means nothing, and for explicit steps, whose stages jump to
+        and fro across r' = 0. (The moves of leapfrog are its velocity. Converged steps may be long beside the time of a wave.)
+        """
+        lost = self.system.lost_heading(before, after)
+        if lost is None and isinstance(before, Phase) and (stuck or np.isfinite(self.integrator.stability_limit)):
+            v = self.system.forward(self.system.frame(self.system.shape(before.hi, before.lo)), before.pi)
+            lost = self.system.lost_heading(before, Phase(before.hi + h * v, before.lo, before.pi))
+        return lost
 
     def _gave_up(self, error: ArithmeticError) -> SimulationError:
         return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)

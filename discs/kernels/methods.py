@@ -1,7 +1,8 @@
 """The integrators in compiled form, for every chain; their plain twins are in `discs.integrators`.
 
 Each takes `steps` steps from hi + lo and pi (or what the method remembers), in place, and returns (taken, gradients, solves,
-unconverged, lost): it stops after a step whose kinetic energy is not below `bound`, or in which disc `lost` >= 0 loses its heading.
+unconverged, lost): it stops after a step whose kinetic energy is not below `bound`, or in which disc `lost` >= 0 loses its heading:
+on the straight way that it went or, if the step did not converge or is explicit, on the way that its velocity pointed.
 """
 
 import numpy as np
@@ -20,10 +21,23 @@ def kinetic(pi):
     return 0.5 * total
 
 
+@part
+def ahead(chain, work, hi, lo, half, slope):
+    """A disc that loses its heading if all go on straight from the base hi + lo by twice `half`, or -1; `half` is lost."""
+    for row in range(hi.shape[0]):
+        for i in range(hi.shape[1]):
+            half[row, i] = hi[row, i] + 2 * half[row, i]
+    do.settle(chain, work, half, lo)
+    lost = do.lost(chain, work, slope)
+    do.settle(chain, work, hi, lo)
+    do.lost(chain, work, slope)
+    return lost
+
+
 @kernel
 def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
     """Midpoint steps of fractions of h, `discs.integrators.midpoint` and `composition`."""
-    work, p, move = do.workspace(chain), np.empty_like(pi), np.empty_like(hi)
+    work, p, move, half = do.workspace(chain), np.empty_like(pi), np.empty_like(hi), np.empty_like(hi)
     still, slope, change = np.zeros_like(hi), np.zeros((2, hi.shape[1])), np.empty(hi.shape[1])
     solves, unconverged, lost = 0, 0, -1
     do.settle(chain, work, hi, lo)
@@ -39,7 +53,13 @@ def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
                 change_of_move = do.sweep(chain, work, tau, pi, p, move, sweep == 0)
                 sweep += 1
             solves += sweep
-            unconverged += tolerance > 0 and sweep == sweeps
+            if tolerance > 0 and sweep == sweeps:
+                unconverged += 1
+                do.frame(chain, work, still, work.c)
+                forward(work.c, pi, half, 0.5 * tau)
+                lost = ahead(chain, work, hi, lo, half, slope)
+                if lost >= 0:
+                    return step + 1, solves, solves, unconverged, lost
             add(hi, lo, move, 2.0)
             for row in range(pi.shape[0]):
                 for i in range(pi.shape[1]):
@@ -166,7 +186,13 @@ def gauss(chain, hi, lo, pi, tableau, h, steps, sweeps, tolerance, bound):
                 forward(stages[i], p[i], v[i])
         gradients += s * sweep
         solves += sweep * (real.size + pairs.size)
-        unconverged += tolerance > 0 and sweep == sweeps
+        if tolerance > 0 and sweep == sweeps:
+            unconverged += 1
+            do.frame(chain, work, still, c)
+            forward(c, pi, move, 0.5 * h)
+            lost = ahead(chain, work, hi, lo, move, slope)
+            if lost >= 0:
+                return step + 1, gradients, solves, unconverged, lost
         combine(b, v, h, move)
         add(hi, lo, move, 1.0)
         for row in range(columns):
@@ -185,13 +211,18 @@ def gauss(chain, hi, lo, pi, tableau, h, steps, sweeps, tolerance, bound):
 @kernel
 def rk4(chain, hi, lo, pi, h, steps, bound):
     """The classical Runge-Kutta method, `discs.integrators.rk4`."""
-    work, c, move = do.workspace(chain), np.empty_like(hi), np.empty_like(hi)
+    work, c, move, still = do.workspace(chain), np.empty_like(hi), np.empty_like(hi), np.zeros_like(hi)
     v, total, g, kick, p = np.empty_like(hi), np.empty_like(hi), np.empty_like(pi), np.empty_like(pi), np.empty_like(pi)
     slope, lost = np.zeros((2, hi.shape[1])), -1
     nodes, weights = np.array([0.5, 0.5, 1.0, 0.0]), np.array([1.0, 2.0, 2.0, 1.0])
     do.settle(chain, work, hi, lo)
     do.lost(chain, work, slope)
     for step in range(steps):
+        do.frame(chain, work, still, c)
+        forward(c, pi, move, 0.5 * h)
+        lost = ahead(chain, work, hi, lo, move, slope)
+        if lost >= 0:
+            return step + 1, 4 * step, 0, 0, lost
         move[:], total[:], kick[:] = 0.0, 0.0, 0.0
         copy(pi, p)
         for i in range(4):
@@ -290,6 +321,9 @@ def perlmutter(chain, hi, lo, pi, h, steps, sweeps, tolerance, bound):
                     move[row, k] = new
                 moved = max(moved, largest(change) / chain.scale[row])
         unconverged += tolerance > 0 and sweep == sweeps
+        lost = ahead(chain, work, hi, lo, half, slope)
+        if lost >= 0:
+            return step + 1, step + 1, 0, unconverged, lost
         add(hi, lo, move, 1.0)
         do.settle(chain, work, hi, lo)
         lost = do.lost(chain, work, slope)

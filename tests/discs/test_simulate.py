@@ -99,15 +99,30 @@ def test_blow_up_names_step_time_disc_and_cause():
     assert 0 <= caught.value.disc < 33
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.3])
-def test_collapsing_ring_stops_with_time_and_disc(dt):
+def collapsing(n):
+    """The ring of the unit law, and the time when it ends: it breathes like sin, see `continuum.exact`."""
     scene = breathing_ring("unit", duration=4.0, omega=0.4)
-    with pytest.raises(SimulationError, match="lost its heading") as caught:
-        simulate(semidiscretise(scene, 24, "consistent"), "midpoint", dt, progress=False)
     a0, rod = scene.rod.length / (2 * np.pi), scene.rod
     nu = rod.radius / a0**2 * np.sqrt(rod.bending_stiffness / rod.inertia)
-    collapse = np.arctan(a0 * nu / (rod.radius * 0.4)) / nu
-    assert caught.value.time == pytest.approx(collapse, abs=dt + 0.02)  # 24 discs are late by 0.01
+    return semidiscretise(scene, n, "consistent"), np.arctan(a0 * nu / (rod.radius * 0.4)) / nu
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.3])
+def test_collapsing_ring_stops_with_time_and_disc(dt):
+    problem, end = collapsing(24)
+    with pytest.raises(SimulationError, match="lost its heading") as caught:
+        simulate(problem, "midpoint", dt, progress=False)
+    assert caught.value.time == pytest.approx(end, abs=dt + 0.02)  # 24 discs are late by 0.01
+
+
+@pytest.mark.parametrize("engine", ["compiled", "plain"])
+@pytest.mark.parametrize("method", FIXED)
+def test_every_method_stops_at_the_collapse(method, engine):
+    problem, end = collapsing(32)
+    for frames in (1, np.arange(300) * np.pi / 300):  # by steps, and by a shorter step to a frame
+        with pytest.raises(SimulationError, match="lost its heading") as caught:
+            simulate(problem, method, frames=frames, progress=False, engine=engine)
+        assert caught.value.time == pytest.approx(end, abs=suggest_dt(problem, method) + 0.006)  # 32 discs are late by 0.0055
 
 
 def test_rest_stays_at_rest():
