@@ -32,7 +32,7 @@ class SlavedSystem(RollingDiscs):
 
     def __init__(self, chain: Chain) -> None:
         n, ends = chain.n, chain.ends
-        self.n, self._ends, self._chain = n, ends, chain
+        self.n, self._k, self._ends, self._chain = n, chain.k, ends, chain
         self.closed, self.reach = ends == "ring", 3 if ends == "consistent" else 2
         self.scale = np.array([chain.length, chain.length, 1.0])
         self._springs: Any = LinearCurvature(chain) if chain.curvature == "linear" else TrueCurvature(chain)
@@ -45,7 +45,6 @@ class SlavedSystem(RollingDiscs):
         inertia = np.asarray(chain.spin_inertia) + np.asarray(chain.density) * self._radius**2
         point = np.max(self._radius**2 / np.maximum(inertia, 1e-300))
         self.stiffest = 4 * float(np.max(chain.bending_stiffness) * point) / chain.k**4
-        self._slope = stencils.slope_matrix(n, chain.k, ends)
 
     # Kinematics
 
@@ -61,7 +60,7 @@ class SlavedSystem(RollingDiscs):
         return shape + stencils.links(dq, self._ends)
 
     def slope(self, shape: NDArray) -> NDArray:
-        return np.array([self._slope @ d for d in shape[:2]])
+        return stencils.slopes(shape[:2], self._k, self._ends)
 
     def contact(self, shape: NDArray) -> NDArray:
         slope = self.slope(shape)
@@ -139,4 +138,4 @@ class SlavedSystem(RollingDiscs):
             return None
         from discs.kernels import slaved  # numba is slow to import
 
-        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs.hessians())
+        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs)

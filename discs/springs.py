@@ -25,15 +25,21 @@ from discs.system import Assembly, folded
 
 
 class LinearCurvature:
-    """Bending energy K |r''|**2/2; the secant of a step is its middle links."""
+    """Bending energy K |r''|**2/2; the secant of a step is its middle links.
+
+    Attributes
+    ----------
+    bend : (n,), K w/k**4, against `stencils.bends`; zero where there is no spring.
+    twist : (n_links,), beta/k, against the difference of theta.
+    """
 
     quadratic = True
 
     def __init__(self, chain: Chain) -> None:
         self._n, self._ends = chain.n, chain.ends
-        self._bend = stencils.bend_matrix(chain.n, chain.k, chain.ends)
-        self._bending = np.asarray(chain.bending_stiffness) * chain.bend_shares
-        self._torsion = np.asarray(chain.torsion_stiffness) / chain.k
+        stiffness = np.asarray(chain.bending_stiffness) * chain.bend_shares / chain.k**4
+        self.bend = np.pad(stiffness, (chain.n - stiffness.size) // 2)
+        self.twist = np.asarray(chain.torsion_stiffness) / chain.k
         self._order = folded(chain.n) if chain.ends == "ring" else None
 
     def potential(self, d: NDArray) -> float:
@@ -41,56 +47,62 @@ class LinearCurvature:
 
     def polarised(self, d: NDArray, other: NDArray) -> float:
         """The symmetric bilinear form of which V is the square."""
-        bending = sum((self._bending * (self._bend @ d[row])) @ (self._bend @ other[row]) for row in range(2))
-        return 0.5 * float(bending + self._torsion * d[2] @ other[2])
+        bends, others = stencils.bends(d[:2], self._ends), stencils.bends(other[:2], self._ends)
+        return 0.5 * float((self.bend * bends * others).sum() + (self.twist * d[2]) @ other[2])
 
     def secant(self, d: NDArray, change: NDArray) -> NDArray:
         return d + 0.5 * change
 
     def tension(self, secant: NDArray) -> NDArray:
         tension = np.empty_like(secant)
-        for row in range(2):
-            tension[row] = self._tension @ secant[row]
-        tension[2] = self._torsion * secant[2]
+        moments = self.bend * stencils.bends(secant[:2], self._ends)
+        tension[:2] = stencils.gathered(stencils.pull(moments, "springs"), self._ends)
+        tension[2] = self.twist * secant[2]
         return tension
-
-    @cached_property
-    def _tension(self) -> "scipy.sparse.csr_array":
-        """The Hessian of V by the links of x or y, (n_links, n_links); kept only where steps are not compiled."""
-        return _elastic(self._bend, self._bending)
 
     def stiffness(self, secant: NDArray, c: NDArray) -> NDArray:
         if self._order is not None:
             c = c[:, self._order]
-        width, n = len(self._bands) - 1, self._n
+        width, n = len(self._ordered) - 1, self._n
         matrix = np.zeros((width + 1, n), order="F")
-        for j, band in enumerate(self._bands):
+        for j, band in enumerate(self._ordered):
             matrix[width - j, j:] = (band[:, j:] * c[:, j:] * c[:, : n - j]).sum(axis=0)
         return matrix
 
+    def bands(self) -> tuple[NDArray, NDArray]:
+        """grad^2 V by x or y (4, n), and by theta (2, n): [j, i] couples discs i and i + j, around a ring n and 0 too."""
+        after = self.twist if self._ends == "ring" else np.append(self.twist, 0.0)
+        return stencils.bend_bands(self.bend, self._ends), np.array([np.roll(after, 1) + after, -after])
+
     def hessians(self) -> "tuple[scipy.sparse.csr_array, scipy.sparse.csr_array]":
         """grad^2 V by x or y, and by theta, (n, n)."""
-        link = stencils.link_matrix(self._n, self._ends)
-        return _elastic(self._bend @ link, self._bending), _elastic(link, self._torsion)
+        bending, torsion = (_symmetric(bands) for bands in self.bands())
+        return bending, torsion
 
     @cached_property
-    def _bands(self) -> NDArray:
-        """grad^2 V, (width + 1, 3, n) in the system's order: [j, :, i] couples discs i - j and i."""
-        n, hessians = self._n, self.hessians()
-        if self._order is not None:
-            hessians = hessians[0][self._order][:, self._order], hessians[1][self._order][:, self._order]
-        # nonzero() leaves out springs of no stiffness, and the bands they would fill
-        width = max(int(abs(row - col).max(initial=0)) for row, col in (a.nonzero() for a in hessians))
-        bands = np.zeros((width + 1, 3, n))
-        for j, band in enumerate(bands):
-            band[:2, j:] = hessians[0].diagonal(j)
-            band[2, j:] = hessians[1].diagonal(j)
-        return bands
+    def _ordered(self) -> NDArray:
+        """The bands in the system's order, (width + 1, 3, n): [j, :, i] couples discs i - j and i; no more than are not zero."""
+        place = np.arange(self._n) if self._order is None else np.argsort(self._order)
+        found = []
+        for rows, bands in zip(([0, 1], [2]), self.bands(), strict=True):
+            for j, band in enumerate(bands):
+                first = np.flatnonzero(band)
+                low, high = np.sort([place[first], place[(first + j) % self._n]], axis=0)
+                found += [(high - low, row, high, band[first]) for row in rows]
+        ordered = np.zeros((1 + max(int(apart.max(initial=0)) for apart, *_ in found), 3, self._n))
+        for apart, row, high, values in found:
+            ordered[apart, row, high] = values
+        return ordered
 
 
-def _elastic(strain: "scipy.sparse.csr_array", stiffness: NDArray) -> "scipy.sparse.csr_array":
-    """B^T (stiffness) B of the strains B, (springs, unknowns)."""
-    return scipy.sparse.csr_array(strain.T @ scipy.sparse.diags_array(stiffness) @ strain)
+def _symmetric(bands: NDArray) -> "scipy.sparse.csr_array":
+    """The matrix of such bands."""
+    n = bands.shape[1]
+    j, first = np.nonzero(bands)
+    second, values = (first + j) % n, bands[j, first]
+    off = j > 0
+    rows, columns = np.append(first, second[off]), np.append(second, first[off])
+    return scipy.sparse.csr_array((np.append(values, values[off]), (rows, columns)), shape=(n, n))
 
 
 class Line(NamedTuple):
@@ -116,8 +128,6 @@ class TrueCurvature:
         self._bending = np.asarray(chain.bending_stiffness) * chain.bend_shares
         self._stretching = np.asarray(chain.stretch_stiffness) * k
         self._torsion = np.asarray(chain.torsion_stiffness) * k
-        # angles of links -> turning per length, (n_bends, n_links)
-        self._difference = stencils.bend_matrix(n, k, "ring" if self._ring else "springs") * k
         self._first = np.arange(n if self._ring else n - 1)  # a link's first and second disc
         self._second = (self._first + 1) % n
         middle = np.arange(n) if self._ring else np.arange(1, n - 1)
@@ -128,6 +138,11 @@ class TrueCurvature:
     def _neighbours(self, values: NDArray) -> tuple[NDArray, NDArray]:
         """Values of links (..., n_links) before and after each bend."""
         return (np.roll(values, 1, axis=-1), values) if self._ring else (values[..., :-1], values[..., 1:])
+
+    def _around(self, values: NDArray) -> tuple[NDArray, NDArray]:
+        """Values of bends (n_bends,) at the first and the second disc of each link; zero where there is no bend."""
+        at_discs = values if self._ring else np.pad(values, 1)
+        return at_discs[self._first], at_discs[self._second]
 
     def _turning(self, d: NDArray) -> NDArray:
         """Turning per length at the bends, (n_bends,): each less than half a turn."""
@@ -152,7 +167,8 @@ class TrueCurvature:
         moment = self._bending * 0.5 * (self._turning(before) + self._turning(after))
         length = 0.5 * (np.hypot(before[0], before[1]) + np.hypot(after[0], after[1]))
         tension = np.empty_like(before)
-        tension[:2] = turn * (self._difference.T @ moment) + stretch * (self._stretching * (length / self._k - 1) / self._k)
+        before_bend, after_bend = self._around(moment)
+        tension[:2] = (turn * (before_bend - after_bend) + stretch * (self._stretching * (length / self._k - 1))) / self._k
         tension[2] = self._torsion * 0.5 * (before[2] + after[2]) / self._k**2
         return tension
 

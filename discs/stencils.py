@@ -1,4 +1,4 @@
-"""Finite differences along a chain, as sparse matrices that act on links.
+"""Finite differences along a chain, taken of its links.
 
 A link is the difference of neighbouring discs, d_i = r_{i+1} - r_i; on a ring the last one closes it. Everything
 the springs and the headings need is a combination of links, and forming them first keeps rounding small: second and
@@ -9,7 +9,6 @@ Kinds of ends: "springs" (plain), "paper" (the same springs; the end discs weigh
 """
 
 import numpy as np
-import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
 ENDS = ("springs", "consistent", "paper", "ring")
@@ -50,46 +49,75 @@ def pull(tension: NDArray, ends: str) -> NDArray:
     return force
 
 
-def link_matrix(n: int, ends: str) -> "scipy.sparse.csr_array":
-    """`links` as a matrix, (n_links, n)."""
+def extended(d: NDArray, ends: str) -> NDArray:
+    """Links with one more at each end, (..., n_links) -> (..., n + 1): the i-th lies before disc i, the next one after it.
+
+    Around a ring the closing link is the first and the last. Beyond a free end lies a ghost disc, at "springs" and "paper" ends
+    r_{-1} = 3 r_0 - 3 r_1 + r_2, at "consistent" ones r_{-1} = 4 r_0 - 6 r_1 + 4 r_2 - r_3.
+    """
     if ends == "ring":
-        return scipy.sparse.diags_array([-1.0, 1.0, 1.0], offsets=[0, 1, 1 - n], shape=(n, n), format="csr")
-    return scipy.sparse.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(n - 1, n), format="csr")
+        return np.concatenate([d[..., -1:], d], axis=-1)
+    longer = np.empty((*d.shape[:-1], d.shape[-1] + 2), d.dtype)
+    longer[..., 1:-1] = d
+    for inner, to in ((d, longer), (d[..., ::-1], longer[..., ::-1])):
+        if ends == "consistent":
+            to[..., 0] = 3 * (inner[..., 0] - inner[..., 1]) + inner[..., 2]
+        else:
+            to[..., 0] = 2 * inner[..., 0] - inner[..., 1]
+    return longer
 
 
-def slope_matrix(n: int, k: float, ends: str) -> "scipy.sparse.csr_array":
-    """Headings r' at the discs from the links, (n, n_links).
+def gathered(tension: NDArray, ends: str) -> NDArray:
+    """The transpose of `extended`, (..., n + 1) -> (..., n_links): what pulls at a ghost link pulls at those it is made of."""
+    if ends == "ring":
+        own = tension[..., 1:].copy()
+        own[..., -1] += tension[..., 0]
+        return own
+    own = tension[..., 1:-1].copy()
+    for inner, ghost in ((own, tension[..., 0]), (own[..., ::-1], tension[..., -1])):
+        for i, share in enumerate((3.0, -3.0, 1.0) if ends == "consistent" else (2.0, -1.0)):
+            inner[..., i] += share * ghost
+    return own
 
-    Inside r'_i = (r_{i+1} - r_{i-1})/2k. At an end
+
+def slopes(d: NDArray, k: float, ends: str) -> NDArray:
+    """Headings r' at the discs from the links, (..., n_links) -> (..., n).
+
+    Inside, and with the ghosts everywhere, r'_i = (r_{i+1} - r_{i-1})/2k. At an end
     "springs", "paper": (-3 r_0 + 4 r_1 - r_2)/2k;
-    "consistent": central with the ghost r_{-1} = 4 r_0 - 6 r_1 + 4 r_2 - r_3, hence (-4 r_0 + 7 r_1 - 4 r_2 + r_3)/2k,
-    whose truncation error k**2 r'''/6 is the inner one.
+    "consistent": (-4 r_0 + 7 r_1 - 4 r_2 + r_3)/2k, whose truncation error k**2 r'''/6 is the inner one.
     """
-    if ends == "ring":
-        mean = scipy.sparse.diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, n - 1], shape=(n, n))
-        return scipy.sparse.csr_array(mean / (2 * k))
-    mean = scipy.sparse.diags_array([1.0, 1.0], offsets=[-1, 0], shape=(n, n - 1))
-    more = [3.0, -3.0, 1.0] if ends == "consistent" else [2.0, -1.0]  # at an end, beside the one that is there
-    m = len(more)
-    places = np.array([[0] * m + [n - 1] * m, [*range(m), *range(n - 2, n - 2 - m, -1)]], np.int32)
-    return scipy.sparse.csr_array((mean + scipy.sparse.coo_array((more + more, tuple(places)), shape=(n, n - 1))) / (2 * k))
+    longer = extended(d, ends)
+    return (longer[..., 1:] + longer[..., :-1]) / (2 * k)
 
 
-def bend_matrix(n: int, k: float, ends: str) -> "scipy.sparse.csr_array":
-    """Curvature vectors r'' at the bends from the links, (n_bends, n_links); a bend is a disc that has a bending spring.
+def bends(d: NDArray, ends: str) -> NDArray:
+    """k**2 r'' at the discs from the links, (..., n_links) -> (..., n): k**2 r''_i = r_{i+1} - 2 r_i + r_{i-1}.
 
-    Inside r''_i = (r_{i+1} - 2 r_i + r_{i-1})/k**2. With "consistent" ends the end discs are bends too, with the same
-    ghost as the heading: r''_0 = (2 r_0 - 5 r_1 + 4 r_2 - r_3)/k**2.
+    With "consistent" ends that is 2 r_0 - 5 r_1 + 4 r_2 - r_3 at an end; "springs" and "paper" have no spring there.
     """
-    if ends == "ring":
-        jump = scipy.sparse.diags_array([-1.0, 1.0, -1.0], offsets=[-1, 0, n - 1], shape=(n, n))
-        return scipy.sparse.csr_array(jump / k**2)
-    jump = scipy.sparse.diags_array([-1.0, 1.0], offsets=[0, 1], shape=(n - 2, n - 1))
+    return np.diff(extended(d, ends))
+
+
+def bend_bands(stiffness: NDArray, ends: str) -> NDArray:
+    """B^T (stiffness) B for B that takes discs to `bends`, (4, n): [j, i] couples discs i and i + j, around a ring n and 0 too.
+
+    stiffness : (n,), zero where there is no spring.
+    """
+    inner, n = stiffness.copy(), stiffness.size
+    bands = np.zeros((4, n))
     if ends == "consistent":
-        first = scipy.sparse.coo_array(([-2.0, 3.0, -1.0], ([0, 0, 0], [0, 1, 2])), shape=(1, n - 1))
-        last = scipy.sparse.coo_array(([2.0, -3.0, 1.0], ([0, 0, 0], [n - 2, n - 3, n - 4])), shape=(1, n - 1))
-        jump = scipy.sparse.vstack([first, jump, last])
-    return scipy.sparse.csr_array(jump / k**2)
+        end = np.array([2.0, -5.0, 4.0, -1.0])
+        for j in range(4):
+            couple = end[: 4 - j] * end[j:]
+            bands[j, : 4 - j] += stiffness[0] * couple
+            bands[j, n - 4 : n - j] += stiffness[-1] * couple[::-1]
+        inner[[0, -1]] = 0
+    after = np.roll(inner, -1)
+    bands[0] += np.roll(inner, 1) + 4 * inner + after
+    bands[1] -= 2 * (inner + after)
+    bands[2] += after
+    return bands
 
 
 def bend_shares(n: int, k: float, ends: str) -> NDArray:

@@ -90,7 +90,7 @@ def _build(mbs: Any, problem: Problem) -> float:
     along, roll = system._springs.hessians()
     by_disc = np.arange(3 * n).reshape(3, n).T.ravel()
     stiffness = sp.csr_array(sp.block_diag([along, along, roll]))[by_disc][:, by_disc]
-    slope = sp.csr_array(stencils.slope_matrix(n, chain.k, chain.ends) @ stencils.link_matrix(n, chain.ends))
+    slope = sp.csr_array(stencils.slopes(stencils.links(np.eye(n), chain.ends), chain.k, chain.ends).T)
     offset = system.slope(at_origin)
 
     blocks = np.array_split(np.arange(n), max(1, round(n / BLOCK)))

@@ -5,7 +5,7 @@ same; at free ends they are the ghosts that make the headings there central, d_0
 3 d_1 - 3 d_2 + d_3 ("consistent").
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from discs.chain import Chain
 from discs.kernels import banded, chain
 from discs.kernels.compiled import fill, part
 from discs.kernels.shared import renew
+from discs.springs import LinearCurvature
 
 PLAIN, GHOST, RING = 0, 1, 2
 
@@ -40,32 +41,25 @@ class Slaved(NamedTuple):
     unit: bool
 
 
-def parameters(given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, hessians: tuple[Any, Any]) -> Slaved:
-    """The parameters of a chain; `hessians` are grad^2 V by x or y and by theta, sparse (n, n)."""
-    n, k, ring = given.n, given.k, given.ends == "ring"
-    bend, torsion = np.zeros(n), np.zeros(n + 1)
-    stiffness = np.asarray(given.bending_stiffness) * given.bend_shares / k**4
-    bend[(n - stiffness.size) // 2 :][: stiffness.size] = stiffness
-    torsion[1 : n + ring] = np.asarray(given.torsion_stiffness) / k
+def parameters(given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, springs: LinearCurvature) -> Slaved:
+    """The parameters of a chain."""
+    n, ring = given.n, given.ends == "ring"
+    torsion, corner = np.zeros(n + 1), np.zeros(2)
+    torsion[1 : n + ring] = springs.twist
     torsion[0] = torsion[n]
-    hessian, twist = (
-        np.array([np.append(matrix.diagonal(j), matrix.diagonal(j - n)) for j in range(width)])  # i with i + j, around a ring
-        for matrix, width in zip(hessians, (3, 2), strict=True)
-    )
-    corner = np.zeros(2)
-    if given.ends == "consistent":
-        corner[:] = hessians[0][0, 3], hessians[0][n - 4, n - 1] if n > 4 else 0.0
+    hessian, twist = springs.bands()
+    corner[:] = hessian[3, [0, n - 4]] if given.ends == "consistent" else 0.0
     return Slaved(
         radius=np.array(given.radius),
         weights=weights,
-        bend=bend,
+        bend=springs.bend,
         torsion=torsion,
-        hessian=hessian,
+        hessian=hessian[:3],
         corner=corner,
         twist=twist,
         scale=scale,
         shift=shift,
-        k=k,
+        k=given.k,
         ends=RING if ring else GHOST if given.ends == "consistent" else PLAIN,
         unit=given.rolling == "unit",
     )

@@ -20,23 +20,39 @@ def test_pull_is_the_transpose_of_links(ends):
     tension = rng.standard_normal(d.shape)
     # a dozen products of order 1
     assert np.vdot(tension, d) == pytest.approx(np.vdot(stencils.pull(tension, ends), values), abs=1e-13)
-    np.testing.assert_allclose(values @ stencils.link_matrix(N, ends).T.toarray(), d, atol=1e-15)
+    longer = stencils.extended(d, ends)
+    tension = rng.standard_normal(longer.shape)
+    assert np.vdot(tension, longer) == pytest.approx(np.vdot(stencils.gathered(tension, ends), d), abs=1e-13)
+
+
+def test_bands_are_the_square_of_bends(ends):
+    stiffness = np.random.default_rng(1).uniform(0.5, 2.0, N)
+    if ends in ("springs", "paper"):
+        stiffness[[0, -1]] = 0
+    bends = stencils.bends(stencils.links(np.eye(N), ends), ends).T
+    full, bands = bends.T @ (stiffness[:, None] * bends), stencils.bend_bands(stiffness, ends)
+    i = np.arange(N)
+    for j in range(1, 4):
+        np.testing.assert_allclose(full[i, (i + j) % N] * (bands[j] != 0), bands[j], atol=1e-12)
+        full[i, (i + j) % N] -= bands[j]
+        full[(i + j) % N, i] -= bands[j]
+    np.testing.assert_allclose(full, np.diag(bands[0]), atol=1e-12)  # nothing is left out
 
 
 @pytest.mark.parametrize("ends", ["springs", "paper", "consistent"])
 def test_slopes_and_bends_are_exact_where_they_should_be(ends):
     k, s = spaced(N, ends)
     quadratic = stencils.links(1.2 + 0.7 * s - 0.4 * s**2, ends)
-    np.testing.assert_allclose(stencils.slope_matrix(N, k, ends) @ quadratic, 0.7 - 0.8 * s, atol=1e-13)
+    np.testing.assert_allclose(stencils.slopes(quadratic, k, ends), 0.7 - 0.8 * s, atol=1e-13)
     # second differences, the one-sided (2, -5, 4, -1) too, are exact on cubics
     cubic = stencils.links(0.3 * s**3 - s**2, ends)
-    places = s if ends == "consistent" else s[1:-1]
-    np.testing.assert_allclose(stencils.bend_matrix(N, k, ends) @ cubic, 1.8 * places - 2, atol=1e-11)
+    inner = slice(None) if ends == "consistent" else slice(1, -1)
+    np.testing.assert_allclose(stencils.bends(cubic, ends)[inner] / k**2, (1.8 * s - 2)[inner], atol=1e-11)
 
 
 def test_consistent_end_headings_err_as_the_inner_ones_do():
     k, s = spaced(N, "consistent")
-    error = stencils.slope_matrix(N, k, "consistent") @ stencils.links(s**3, "consistent") - 3 * s**2
+    error = stencils.slopes(stencils.links(s**3, "consistent"), k, "consistent") - 3 * s**2
     # k^2/6 times the third derivative, at every disc
     np.testing.assert_allclose(error, k**2, rtol=1e-9)
 
@@ -45,9 +61,9 @@ def test_ring_is_exact_on_waves_up_to_the_symbols():
     k, s = spaced(N, "ring")
     q = 2 * np.pi * 2 / LENGTH
     d = stencils.links(np.cos(q * s), "ring")
-    np.testing.assert_allclose(stencils.slope_matrix(N, k, "ring") @ d, -np.sin(q * k) / k * np.sin(q * s), atol=1e-12)
+    np.testing.assert_allclose(stencils.slopes(d, k, "ring"), -np.sin(q * k) / k * np.sin(q * s), atol=1e-12)
     second = -((2 / k * np.sin(q * k / 2)) ** 2) * np.cos(q * s)
-    np.testing.assert_allclose(stencils.bend_matrix(N, k, "ring") @ d, second, atol=1e-12)
+    np.testing.assert_allclose(stencils.bends(d, "ring") / k**2, second, atol=1e-12)
 
 
 def test_shares_sum_to_the_length(ends):
