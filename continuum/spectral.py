@@ -83,7 +83,7 @@ class Course:
             work = Work()
             after = self._method.step(rod, z, h, work)
             return (z, 0) if work.unconverged or not rod.energy(after) <= bound else (after, 1)
-        from continuum.kernels.spectral import gauss
+        from continuum.kernels.collocation import gauss
 
         z = Phase(z.hi.copy(), z.lo.copy(), z.pi.copy())
         method, coefficients = self._method, tuple(tableau(self._method.stages))

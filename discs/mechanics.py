@@ -29,10 +29,9 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike, NDArray
 
-from discs import checks
+from discs import checks, saddle
 
 STEP = 1e-30  # of derivatives along the imaginary axis, which have no rounding: f(q + i h v) = f(q) + i h df/dq.v + O(h^2)
-SINGULAR = 1e-12  # pivots and ranks below this, relative to the largest, are looked into
 
 
 class Motion(NamedTuple):
@@ -155,48 +154,11 @@ class MechanicalSystem:
 
     def saddle_point(self, q: NDArray) -> Any:
         """The matrix [[M, A^T], [A, 0]], (m + c, m + c), sparse if A is."""
-        m, a = self.mass(q), self.constraint(q)
-        if not scipy.sparse.issparse(a):
-            return np.block([[m, a.T], [a, np.zeros((len(a), len(a)))]])
-        m, a = scipy.sparse.coo_array(m), scipy.sparse.coo_array(a)
-        row, column = a.coords[0] + m.shape[0], a.coords[1]
-        places = np.concatenate([m.coords[0], row, column]), np.concatenate([m.coords[1], column, row])
-        size = m.shape[0] + a.shape[0]
-        return scipy.sparse.coo_array((np.concatenate([m.data, a.data, a.data]), places), shape=(size, size)).tocsc()
+        return saddle.matrix(self.mass(q), self.constraint(q))
 
     def _solve(self, q: NDArray, f: NDArray, g: NDArray) -> Motion:
         """u and lambda with M u = f + A^T lambda, A u = g."""
-        pivots, solve = _factors(self.saddle_point(q))
-        if not pivots.min() > SINGULAR * pivots.max():
-            self._explain(q, g)
-        unknowns = solve(np.concatenate([f, g]))
-        return Motion(unknowns[: len(f)], -unknowns[len(f) :])
-
-    def _explain(self, q: NDArray, g: NDArray) -> None:
-        """Raise ValueError with what makes the saddle point singular, part by part of constraints that share coordinates."""
-        a = scipy.sparse.csr_array(self.constraint(q))
-        parts, part = scipy.sparse.csgraph.connected_components(abs(a) @ abs(a).T, directed=False)
-        for p in range(parts):
-            rows = np.flatnonzero(part == p)
-            block = a[rows].toarray()
-            block, right = block[:, np.any(block != 0, axis=0)], g[rows]
-            rank = int(np.linalg.matrix_rank(block, rtol=SINGULAR)) if block.size else 0
-            if rank == len(rows):
-                continue
-            owners = ", ".join(dict.fromkeys(self.owners[i] for i in rows))
-            least = np.linalg.lstsq(block, right)[0] if block.size else np.zeros(0)
-            if np.abs(block @ least - right).max() > 1e-9 * max(np.abs(right).max(), 1e-300):
-                raise ValueError(f"constraints of {owners} contradict each other: no motion obeys all {len(rows)}; take one away")
-            raise ValueError(
-                f"constraints of {owners} are redundant: {len(rows)} rows of rank {rank}, so that multipliers are not determined; "
-                f"take {len(rows) - rank} away"
-            )
-        kernel = scipy.linalg.null_space(a.toarray())
-        inertia = kernel.T @ (self.mass(q) @ kernel)
-        sizes, directions = np.linalg.eigh(inertia)
-        if sizes[0] <= SINGULAR * sizes[-1]:
-            worst = self.names[int(np.argmax(np.abs(kernel @ directions[:, 0])))]
-            raise ValueError(f"M must be positive on velocities that the constraints allow; there is no inertia against {worst}")
+        return Motion(*saddle.solve(self.mass(q), self.constraint(q), f, g, self.names, self.owners))
 
     def magnetic(self, q: ArrayLike, v: ArrayLike) -> NDArray:
         """G of the vakonomic equations, (m, c): (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) v_k; see `discs.vakonomic`."""
@@ -314,15 +276,3 @@ class MechanicalSystem:
 
     def _vectors(self, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, NDArray]:
         return tuple(checks.vector(name, given, len(self.names)) for name, given in (("q", q), ("v", v)))  # type: ignore[return-value]
-
-
-def _factors(matrix: Any) -> tuple[NDArray, Callable[[NDArray], NDArray]]:
-    """Pivots of a matrix, in size, and what solves with it."""
-    if scipy.sparse.issparse(matrix):
-        try:
-            factors = scipy.sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A")
-        except RuntimeError:  # a pivot is zero exactly
-            return np.zeros(1), lambda right: np.full_like(right, np.nan)
-        return np.abs(factors.U.diagonal()), factors.solve
-    lu, exchanges, _ = scipy.linalg.lapack.dgetrf(matrix)
-    return np.abs(np.diag(lu)), lambda right: scipy.linalg.lapack.dgetrs(lu, exchanges, right)[0]

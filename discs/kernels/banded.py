@@ -53,12 +53,12 @@ def factor_few(a, u, w, corner):
 
 def at(b, i):
     """b[i], or where b holds two columns (2, n) both of their entries."""
-    return b[i]
+    return b[..., i]
 
 
 def put(b, i, x):
     """b[i] = x, for one column or two."""
-    b[i] = x
+    b[..., i] = x
 
 
 def less(x, k, y):

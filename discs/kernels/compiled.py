@@ -1,5 +1,5 @@
 """How kernels are compiled: `kernel` for those called from Python, `part` for their parts, `fill` for the parts that differ by
-chain.
+chain. With NUMBA_DISABLE_JIT=1 all run as plain Python, for a debugger and to see which lines are reached.
 
 Kernels are cached on disc, so compiling is paid once per machine. numba knows a cached kernel by the file it stands in, not by
 those it calls; the cache is therefore kept in a folder named by the content of all kernels.
@@ -8,7 +8,7 @@ those it calls; the cache is therefore kept in a folder named by the content of 
 import hashlib
 import inspect
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial, singledispatch
 from pathlib import Path
 from typing import Any
 
@@ -21,21 +21,22 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 PART: dict[str, Any] = OPTIONS | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-def _cache() -> str:
-    sources = sorted(Path(__file__).parent.glob("*.py"))
+@cache
+def _cache(folder: Path) -> str:
+    """Where compiled kernels of a folder are kept: they may call all that is in it, and all that is here."""
+    here = Path(__file__).parent
+    sources = sorted(here.glob("*.py")) + sorted(folder.glob("*.py")) * (folder != here)
     content = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-    base = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else Path(__file__).parent / "__pycache__"
+    base = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else here / "__pycache__"
     return str(base / f"kernels-{content}")
 
 
-CACHE = _cache()
-
-
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Compile a function at its first call; where CACHE cannot be written numba keeps its cache with the user's."""
+    """Compile a function at its first call; where the cache cannot be written numba keeps it with the user's."""
     if function is None:
         return partial(kernel, **options)
-    own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, CACHE
+    folder = Path(inspect.getfile(function)).parent
+    own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _cache(folder)
     try:
         return numba.njit(cache=True, **OPTIONS | options)(function)
     finally:
@@ -47,8 +48,13 @@ def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return partial(part, **options) if function is None else numba.njit(**PART | options)(function)
 
 
-def fill(stub: Callable[..., Any], chain: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Give a function that every chain has its form for one `chain`, the type of its first argument."""
+def stub(function: Callable[..., Any]) -> Any:
+    """A function that every chain has its form for, told by the type of its first argument; see `fill`."""
+    return singledispatch(function)
+
+
+def fill(stub: Any, chain: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a stub its form for one `chain`."""
 
     def register(function: Callable[..., Any]) -> Callable[..., Any]:
         def choose(first: Any, *rest: Any) -> Any:
@@ -56,6 +62,6 @@ def fill(stub: Callable[..., Any], chain: type, **options: Any) -> Callable[[Cal
 
         choose.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba asks for the same one
         overload(stub, jit_options=PART | options)(choose)
-        return function
+        return stub.register(chain, function)
 
     return register

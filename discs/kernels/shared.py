@@ -1,8 +1,9 @@
-"""What the chains share: C acts on a disc's own momenta, roll on rows x, y, theta and turning on row phi.
+"""What chains and methods share. C acts on a disc's own momenta, roll on rows x, y, theta and turning on row phi.
 
 c, v : (rows, n). p : (1, n), or (2, n) with own headings.
 """
 
+from discs.kernels import chain as do
 from discs.kernels.compiled import part
 
 
@@ -69,3 +70,25 @@ def add(hi, lo, increment, factor):
             part = total - a[i]
             b[i] = (a[i] - (total - part)) + (term - part)
             a[i] = total
+
+
+@part
+def kinetic(pi):
+    total = 0.0
+    for row in range(pi.shape[0]):
+        for i in range(pi.shape[1]):
+            total += pi[row, i] * pi[row, i]
+    return 0.5 * total
+
+
+@part
+def ahead(chain, work, hi, lo, half, slope):
+    """A disc that loses its heading if all go on straight from the base hi + lo by twice `half`, or -1; `half` is lost."""
+    for row in range(hi.shape[0]):
+        for i in range(hi.shape[1]):
+            half[row, i] = hi[row, i] + 2 * half[row, i]
+    do.settle(chain, work, half, lo)
+    lost = do.lost(chain, work, slope)
+    do.settle(chain, work, hi, lo)
+    do.lost(chain, work, slope)
+    return lost

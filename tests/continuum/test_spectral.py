@@ -9,7 +9,7 @@ from tqdm import tqdm
 from continuum import Rod, Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
 from continuum.bases import polynomials, waves
 from continuum.galerkin import SpectralRod
-from continuum.kernels.spectral import gauss
+from continuum.kernels.collocation import gauss
 from continuum.scenes import PAPER
 from continuum.spectral import Course
 from discs import Gauss6, Gauss8, SimulationError

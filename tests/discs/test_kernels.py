@@ -13,7 +13,7 @@ from discs import Chain, Midpoint, Problem, State, marching, simulate
 from discs.integrators import METHODS
 from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
-from discs.kernels import banded, blocks, steered
+from discs.kernels import banded, blocks, steered_links
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 
 COMPILED = SLAVED + STEERED
@@ -139,7 +139,7 @@ def test_sines_and_cosines():
     @numba.njit
     def all_of(x, cos, sin):
         for i in range(x.size):
-            cos[i], sin[i] = steered.turn(x[i])
+            cos[i], sin[i] = steered_links.turn(x[i])
 
     x = np.concatenate([np.linspace(-20, 20, 4001), np.array([0.0, 1e-300, 1e5, -1e6]), np.pi / 4 * np.arange(-40, 41)])
     cos, sin = np.empty_like(x), np.empty_like(x)
