@@ -34,7 +34,7 @@ from discs import checks, saddle
 STEP = 1e-30  # of derivatives along the imaginary axis, which have no rounding: f(q + i h v) = f(q) + i h df/dq.v + O(h^2)
 
 
-class Motion(NamedTuple):
+class Response(NamedTuple):
     """Accelerations (m,) and multipliers lambda (c,), the forces of constraint being A^T lambda."""
 
     acceleration: NDArray
@@ -156,9 +156,9 @@ class MechanicalSystem:
         """The matrix [[M, A^T], [A, 0]], (m + c, m + c), sparse if A is."""
         return saddle.matrix(self.mass(q), self.constraint(q))
 
-    def _solve(self, q: NDArray, f: NDArray, g: NDArray) -> Motion:
+    def _solve(self, q: NDArray, f: NDArray, g: NDArray) -> Response:
         """u and lambda with M u = f + A^T lambda, A u = g."""
-        return Motion(*saddle.solve(self.mass(q), self.constraint(q), f, g, self.names, self.owners))
+        return Response(*saddle.solve(self.mass(q), self.constraint(q), f, g, self.names, self.owners))
 
     def magnetic(self, q: ArrayLike, v: ArrayLike) -> NDArray:
         """G of the vakonomic equations, (m, c): (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) v_k; see `discs.vakonomic`."""
@@ -167,7 +167,7 @@ class MechanicalSystem:
         d = np.stack([a.toarray() if hasattr(a, "toarray") else a for a in slopes], axis=-1)  # dA_ak/dq_j
         return (v @ d - d @ v).T
 
-    def accelerations(self, q: ArrayLike, v: ArrayLike, mu: ArrayLike | None = None) -> Motion:
+    def accelerations(self, q: ArrayLike, v: ArrayLike, mu: ArrayLike | None = None) -> Response:
         """Accelerations and multipliers from the saddle point, sparse; nonholonomic without mu, vakonomic with mu.
 
         Parameters
@@ -193,7 +193,7 @@ class MechanicalSystem:
         q, v = self._vectors(q, v)
         return self._solve(q, self.mass(q) @ v, self.drive).acceleration
 
-    def reduced(self, q: ArrayLike, v: ArrayLike) -> Motion:
+    def reduced(self, q: ArrayLike, v: ArrayLike) -> Response:
         """The same accelerations and multipliers from the reduced form, dense: for small systems and for teaching."""
         q, v = self._vectors(q, v)
         m, a, f = self.mass(q), scipy.sparse.csc_array(self.constraint(q)), self.force(q, v)
@@ -202,7 +202,7 @@ class MechanicalSystem:
         b = scipy.linalg.null_space(a.toarray())
         u = np.linalg.solve(b.T @ (m @ b), b.T @ (f - m @ w))
         acceleration = w + b @ u
-        return Motion(acceleration, np.atleast_1d(scipy.sparse.linalg.spsolve(square, a @ (m @ acceleration - f))))
+        return Response(acceleration, np.atleast_1d(scipy.sparse.linalg.spsolve(square, a @ (m @ acceleration - f))))
 
     def residual(self, q: ArrayLike, v: ArrayLike) -> NDArray:
         """A v - b, (c,)."""

@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -13,7 +14,7 @@ from discs import Chain, Midpoint, Problem, State, marching, simulate
 from discs.integrators import METHODS
 from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
-from discs.kernels import banded, blocks, steered_links
+from discs.kernels import banded, blocks, compiled, steered_links
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 
 COMPILED = SLAVED + STEERED
@@ -191,3 +192,12 @@ def test_importing_does_not_compile():
     """numba is slow to import: it is taken only when something runs."""
     code = "import sys, discs; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_compiled_kernels_are_kept_by_all_that_they_may_call(tmp_path):
+    kept = compiled._cache.__wrapped__
+    (tmp_path / "rod.py").write_text("one = 1")
+    before = kept(tmp_path)
+    assert before == kept(tmp_path) != kept(Path(compiled.__file__).parent)
+    (tmp_path / "rod.py").write_text("one = 2")
+    assert kept(tmp_path) != before
