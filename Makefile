@@ -7,7 +7,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 # no advertisement of another tool in the middle of `make docs`
 export NO_MKDOCS_2_WARNING := 1
-# what touches every dependency, in a minute or two
+# what touches every dependency, in some minutes, most of them for compiling with the oldest numba
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
     $(addprefix continuum/test_, cells.py lagrangian.py))
 

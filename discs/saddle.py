@@ -37,11 +37,12 @@ def _explain(m: Any, a: Any, g: NDArray, names: Sequence[str], owners: Sequence[
         rows = np.flatnonzero(part == p)
         block = a[rows].toarray()
         block, right = block[:, np.any(block != 0, axis=0)], g[rows]
-        rank = int(np.linalg.matrix_rank(block, rtol=SINGULAR)) if block.size else 0
+        sizes = np.linalg.svd(block, compute_uv=False) if block.size else np.zeros(1)
+        rank = np.count_nonzero(sizes > SINGULAR * sizes[0])
         if rank == len(rows):
             continue
         theirs = ", ".join(dict.fromkeys(owners[i] for i in rows.tolist()))
-        least = np.linalg.lstsq(block, right)[0] if block.size else np.zeros(0)
+        least = np.linalg.lstsq(block, right, rcond=SINGULAR)[0] if block.size else np.zeros(0)
         if np.abs(block @ least - right).max() > 1e-9 * max(np.abs(right).max(), 1e-300):
             raise ValueError(f"constraints of {theirs} contradict each other: no motion obeys all {len(rows)}; take one away")
         raise ValueError(
