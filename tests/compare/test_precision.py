@@ -49,18 +49,25 @@ def test_failures_stay_in_the_table():
     def slow(setting: float, seconds: float) -> Outcome:
         raise Cutoff
 
+    def crawls(setting: float, seconds: float) -> Outcome:
+        return slow(setting, seconds) if setting == 1e-3 else wrong(setting, seconds)
+
     def broken(setting: float, seconds: float) -> Outcome:
         raise ArithmeticError("the step became too small")
 
     def methods(problem: Problem) -> list[Peer]:
-        return [Peer(run.__name__, (1e-3, 1e-4), run, "differs") for run in (wrong, slow, broken)]
+        return [Peer(run.__name__, (1e-3, 1e-4, 1e-5), run, "differs") for run in (wrong, slow, crawls, broken)]
 
     study = work_precision({"short": untwisting_rod(duration=0.2)}, (9,), methods, repeats=2, seconds=5.0, progress=False)
     rows = {(r.method, r.setting): r for r in study.rows}
     assert rows["wrong", 1e-3].remark == "says it succeeded, and is wrong"
     assert rows["wrong", 1e-3].seconds == 1e-3
-    assert "cut off after 5 s" in rows["slow", 1e-3].remark
-    assert ("slow", 1e-4) not in rows
+    assert rows["slow", 1e-3].remark == rows["crawls", 1e-3].remark == "cut off after 5 s"
+    assert rows["slow", 1e-4].remark == "cut off after 5 s; tighter left out"
+    assert ("slow", 1e-5) not in rows
+    assert (
+        rows["crawls", 1e-4].seconds == rows["crawls", 1e-5].seconds == 1e-3
+    )  # a tighter setting may pass where a loose one crawls
     assert "failed: the step became too small" in rows["broken", 1e-4].remark
     assert np.isnan(rows["broken", 1e-4].error)
     assert any(r.ours and r.method == "auto" and r.error < 1e-6 for r in study.rows)
