@@ -67,7 +67,7 @@ def test_failures_stay_in_the_table():
     assert ("slow", 1e-5) not in rows
     assert (
         rows["crawls", 1e-4].seconds == rows["crawls", 1e-5].seconds == 1e-3
-    )  # a tighter setting may pass where a loose one crawls
+    )  # as CVODE does
     assert "failed: the step became too small" in rows["broken", 1e-4].remark
     assert np.isnan(rows["broken", 1e-4].error)
     assert any(r.ours and r.method == "auto" and r.error < 1e-6 for r in study.rows)
