@@ -226,8 +226,9 @@ def work_precision(
     """Measure speed against error at the end of scenes.
 
     Every method runs from loose to tight settings: once to warm up, then `repeats` times, of which the median counts. What takes
-    longer than `seconds`/(4 `repeats`) is run once. A run is cut off after `seconds`, and a method after two such runs or three
-    times that; its tighter settings are left out, and the table says so. (CVODE may crawl at one tolerance and not at the next.)
+    longer than `seconds`/(4 `repeats`) is run once. A run is cut off after `seconds`; after two such runs, or once a method has
+    taken three times that, its tighter settings are left out, and the table says so. (CVODE may crawl at one tolerance and not
+    at the next.)
 
     Parameters
     ----------
@@ -276,7 +277,7 @@ def _measure(peer: Peer, name: str, n: int, exact: NDArray, ours: bool, repeats:
                     times = [peer.run(setting, limit).seconds for _ in range(repeats)]
         except Cutoff:
             cut += 1
-            remark = f"cut off after {limit:g} s" + "; tighter left out" * (cut == 2)
+            remark = f"cut off after {limit:g} s" + "; tighter left out" * (cut == 2 and setting != peer.settings[-1])
             rows.append(row._replace(seconds=clock.perf_counter() - begun, remark=remark))
             if cut == 2:
                 break

@@ -11,7 +11,7 @@ import numpy as np
 from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
-from discs.system import Phase, RollingDiscs
+from discs.system import Phase, Placed, RollingDiscs
 
 NOTICE = 2.0  # seconds of compiling after which it is said
 _PREPARED: set[tuple[type, type]] = set()
@@ -70,6 +70,7 @@ class March:
         self.system, self.work, self.step = problem.system, Work(), 0
         self.kernel = self.system.kernel if compiled else None
         self.twin = integrator if self.kernel is not None and isinstance(integrator, FixedStep) else None  # steps compiled
+        self.explicit = bool(np.isfinite(integrator.stability_limit))
         self.chunk = max(1, CHUNK // self.system.n)
         self.bound = problem.blown_up
         if problem.ill_posed:
@@ -127,8 +128,9 @@ class March:
             raise self._gave_up(error) from None
         if tau:
             time = self.step * self.h + tau
-            moved = Phase(frame.hi, frame.lo, frame.rate)
-            self._check_heading(self._lost(self.memory, moved, tau, self.work.unconverged > stuck), self.step, time)
+            by_velocity = self.explicit or self.work.unconverged > stuck
+            lost = frame.lost if frame.lost >= 0 else self._lost(self.memory, frame, tau, by_velocity)
+            self._check_heading(lost, self.step, time)
             self._check_energy(self.system.kinetic(frame.rate), frame, self.step, time)
         return frame
 
@@ -152,19 +154,21 @@ class March:
             self.memory = self.integrator.advance(self.system, previous, self.h, self.work)
         except ArithmeticError as error:
             raise self._gave_up(error) from None
-        self._check(self._lost(previous, self.memory, self.h, self.work.unconverged > stuck), self.step + 1)
+        # leapfrog remembers more than a state; its moves are its velocity
+        by_velocity = self.work.unconverged > stuck or (self.explicit and isinstance(previous, Phase))
+        self._check(self._lost(previous, self.memory, self.h, by_velocity), self.step + 1)
         return 1
 
-    def _lost(self, before: Any, after: Any, h: float, stuck: bool) -> int | None:
-        """A disc that lost its heading in a step: on the straight way that it went, or that its velocity pointed.
+    def _lost(self, before: Any, after: Placed, h: float, by_velocity: bool) -> int | None:
+        """A disc that lost its heading on the straight way from memory `before` to `after`, or that its velocity pointed.
 
-        The second where a step did not converge, so that where it leads means nothing, and for explicit steps, whose stages jump to
-        and fro across r' = 0. (The moves of leapfrog are its velocity. Converged steps may be long beside the time of a wave.)
+        The velocity tells where a step did not converge, so that where it leads means nothing, and in explicit steps, whose stages
+        jump to and fro across r' = 0. (Converged steps may be long beside the time of a wave: there it would tell wrong.)
         """
         lost = self.system.lost_heading(before, after)
-        if lost is None and isinstance(before, Phase) and (stuck or np.isfinite(self.integrator.stability_limit)):
-            v = self.system.forward(self.system.frame(self.system.shape(before.hi, before.lo)), before.pi)
-            lost = self.system.lost_heading(before, Phase(before.hi + h * v, before.lo, before.pi))
+        if lost is None and by_velocity and self.system.vanishing:
+            start = self.integrator.at(self.system, before, 0.0, self.h, self.work)
+            lost = self.system.lost_heading(before, start._replace(hi=start.hi + h * start.rate))
         return lost
 
     def _gave_up(self, error: ArithmeticError) -> SimulationError:

@@ -11,7 +11,7 @@ SINGULAR = 1e-12  # pivots and ranks below this, relative to the largest, are lo
 
 
 def matrix(m: Any, a: Any) -> Any:
-    """[[M, A^T], [A, 0]], (m + c, m + c), sparse if A is."""
+    """[[M, A^T], [A, 0]] of m (k, k) and a (c, k), sparse if A is."""
     if not scipy.sparse.issparse(a):
         return np.block([[m, a.T], [a, np.zeros((len(a), len(a)))]])
     m, a = scipy.sparse.coo_array(m), scipy.sparse.coo_array(a)
@@ -22,7 +22,10 @@ def matrix(m: Any, a: Any) -> Any:
 
 
 def solve(m: Any, a: Any, f: NDArray, g: NDArray, names: Sequence[str], owners: Sequence[str]) -> tuple[NDArray, NDArray]:
-    """u and lambda; ValueError with what makes them undetermined, by the coordinates' `names` and the rows' `owners`."""
+    """u (k,) and lambda (c,) of m (k, k), a (c, k), f (k,), g (c,).
+
+    ValueError with what makes them undetermined, by the `names` of coordinates (k,) and the `owners` of rows (c,).
+    """
     pivots, invert = _factors(matrix(m, a))
     if not pivots.min() > SINGULAR * pivots.max():
         _explain(m, scipy.sparse.csr_array(a), g, names, owners)

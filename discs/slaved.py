@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from discs import stencils
 from discs.chain import Chain
 from discs.springs import LinearCurvature, TrueCurvature
-from discs.system import Phase, RollingDiscs, folded
+from discs.system import Placed, RollingDiscs, folded
 
 
 class SlavedSystem(RollingDiscs):
@@ -38,7 +38,7 @@ class SlavedSystem(RollingDiscs):
         self._springs: Any = LinearCurvature(chain) if chain.curvature == "linear" else TrueCurvature(chain)
         self.quadratic = self._springs.quadratic
         self._shift = np.array([*chain.shift, 0.0])
-        self._unit = chain.rolling == "unit"
+        self._unit = self.vanishing = chain.rolling == "unit"
         self._radius = np.asarray(chain.radius)
         mass = chain.w * np.asarray(chain.density)
         self.weights = np.array([mass, mass, chain.w * np.asarray(chain.spin_inertia)])
@@ -96,9 +96,9 @@ class SlavedSystem(RollingDiscs):
     def momentum(self, shape: NDArray, rates: NDArray) -> NDArray:
         return np.sqrt(self.inertia(self.contact(shape))) * rates[0]
 
-    def lost_heading(self, before: Phase, after: Phase) -> int | None:
+    def lost_heading(self, before: Placed, after: Placed) -> int | None:
         """Under the unit law: a disc whose r', on the straight way between two configurations, comes below 1e-3."""
-        if not self._unit:
+        if not self.vanishing:
             return None
         a, b = (self.slope(self.shape(z.hi, z.lo)) for z in (before, after))
         move = b - a

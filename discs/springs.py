@@ -96,7 +96,7 @@ class LinearCurvature:
 
 
 def _symmetric(bands: NDArray) -> "scipy.sparse.csr_array":
-    """The matrix of such bands."""
+    """The matrix, (n, n), of bands as `LinearCurvature.bands` gives them."""
     n = bands.shape[1]
     j, first = np.nonzero(bands)
     second, values = (first + j) % n, bands[j, first]

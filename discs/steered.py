@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from discs import stencils
 from discs.chain import SteeredChain
-from discs.system import Assembly, Phase, RollingDiscs, folded
+from discs.system import Assembly, Placed, RollingDiscs, folded
 
 
 class Links(NamedTuple):
@@ -61,6 +61,7 @@ class SteeredSystem(RollingDiscs):
     rows = ("x", "y", "theta", "phi")
     quadratic = False
     reach = 1
+    vanishing = False
 
     def __init__(self, chain: SteeredChain) -> None:
         self.n, self._k, self._ends, self._chain = chain.n, chain.k, chain.ends, chain
@@ -124,7 +125,7 @@ class SteeredSystem(RollingDiscs):
     def momentum(self, shape: Links, rates: NDArray) -> NDArray:
         return self._roots * rates
 
-    def lost_heading(self, before: Phase, after: Phase) -> int | None:
+    def lost_heading(self, before: Placed, after: Placed) -> int | None:
         return None
 
     # Springs

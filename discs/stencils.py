@@ -4,8 +4,8 @@ A link is the difference of neighbouring discs, d_i = r_{i+1} - r_i; on a ring t
 the springs and the headings need is a combination of links, and forming them first keeps rounding small: second and
 fourth differences of positions of order 1 would lose k**2 and k**4 of their digits, differences of links do not.
 
-Kinds of ends: "springs" (plain), "paper" (the same springs; the end discs weigh more, see `shares`), "consistent"
-(a ghost disc beyond each end), "ring" (none).
+Kinds of ends: "springs" (plain), "paper" (the same springs; the end discs weigh more, see `shares`), "consistent" (end discs bear
+a spring too), "ring" (none). Beyond each free end lies a ghost disc, see `extended`.
 """
 
 import numpy as np

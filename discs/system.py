@@ -14,11 +14,21 @@ secant matrix B, then D = B^T (stiffness) (s_0 + s_1)/2 is one.
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
+
+
+class Placed(Protocol):
+    """What has positions hi + lo, (rows, n)."""
+
+    @property
+    def hi(self) -> NDArray: ...
+
+    @property
+    def lo(self) -> NDArray: ...
 
 
 class Phase(NamedTuple):
@@ -125,12 +135,14 @@ class RollingDiscs(SkewGradient):
     weights : (rows, n), inertia of each disc against each coordinate's rate.
     closed : whether the chain is a ring.
     reach : how many discs to either side a disc's rates depend on.
+    vanishing : whether a heading can vanish.
     stiffest : bound of the entries of C^T (grad^2 V) C, per time squared.
     """
 
     weights: NDArray
     closed: bool
     reach: int
+    vanishing: bool
     stiffest: float
 
     # Kinematics
@@ -152,7 +164,7 @@ class RollingDiscs(SkewGradient):
         """pi of the rates of roll (row 0) and, with own headings, of turning (row 1)."""
 
     @abstractmethod
-    def lost_heading(self, before: Phase, after: Phase) -> int | None:
+    def lost_heading(self, before: Placed, after: Placed) -> int | None:
         """A disc whose heading vanished between two configurations, or None."""
 
     def kinetic(self, v: NDArray) -> float:

@@ -90,6 +90,7 @@ def _build(mbs: Any, problem: Problem) -> float:
     along, roll = system._springs.hessians()
     by_disc = np.arange(3 * n).reshape(3, n).T.ravel()
     stiffness = sp.csr_array(sp.block_diag([along, along, roll]))[by_disc][:, by_disc]
+    # dense first: 33 MB at N = 2048
     slope = sp.csr_array(stencils.slopes(stencils.links(np.eye(n), chain.ends), chain.k, chain.ends).T)
     offset = system.slope(at_origin)
 

@@ -43,11 +43,15 @@ class Tally(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Positions q = hi + lo and their rates of change, all (rows, n)."""
+    """Positions q = hi + lo and their rates of change, all (rows, n).
+
+    lost : a disc that a compiled step on the way saw losing its heading, or -1; then the rest means nothing.
+    """
 
     hi: NDArray
     lo: NDArray
     rate: NDArray
+    lost: int = -1
 
 
 class Integrator(ABC):
@@ -113,7 +117,8 @@ class FixedStep(Integrator):
     def march(self, chain: Any, memory: Any, h: float, steps: int, bound: float) -> tuple[Any, Tally]:
         """The compiled twin of `steps` times `advance`, for the parameters `system.kernel` of a chain.
 
-        Stops after a step whose kinetic energy is not below `bound`, or in which a disc loses its heading.
+        Stops after a step whose kinetic energy is not below `bound`, and in one in which a disc loses its heading; where the discs
+        are means nothing then.
         """
 
 
@@ -149,13 +154,14 @@ class OneStep(FixedStep):
             return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
         from discs.kernels import methods
 
-        z = memory
+        z, lost = memory, -1
         if tau:
             z, tally = self.march(chain, memory, tau, 1, np.inf)
             work.add(tally)
+            lost = tally.lost
         rate = np.empty_like(z.hi)
         methods.rates(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), rate)
-        return Frame(z.hi, z.lo, rate)
+        return Frame(z.hi, z.lo, rate, lost)
 
     @final
     def keep(self, memory: Phase) -> dict[str, Any]:

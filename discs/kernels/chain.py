@@ -64,5 +64,10 @@ def potential(chain, work):
 
 
 @stub
+def vanishing(chain):
+    """Whether a heading can vanish."""
+
+
+@stub
 def lost(chain, work, slope):
     """A disc whose heading vanishes on the straight way from `slope` (2, n) to the base's, or -1; then `slope` is the base's."""

@@ -1,4 +1,4 @@
-"""Gauss collocation in compiled form, for every chain; called and told from as `discs.kernels.methods` are."""
+"""Gauss collocation in compiled form, for every chain; what it takes and returns is that of `discs.kernels.methods`."""
 
 import numpy as np
 

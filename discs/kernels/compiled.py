@@ -8,7 +8,7 @@ those it calls; the cache is therefore kept in a folder named by the content of 
 import hashlib
 import inspect
 from collections.abc import Callable
-from functools import cache, partial, singledispatch
+from functools import cache, partial, singledispatch, wraps
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +50,15 @@ def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 def stub(function: Callable[..., Any]) -> Any:
     """A function that every chain has its form for, told by the type of its first argument; see `fill`."""
-    return singledispatch(function)
+
+    @wraps(function)
+    def missing(chain: Any, *rest: Any) -> Any:
+        raise NotImplementedError(f"{type(chain).__name__} has no {function.__name__}")
+
+    return singledispatch(missing)
 
 
-def fill(stub: Any, chain: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def fill(of: Any, chain: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Give a stub its form for one `chain`."""
 
     def register(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -61,7 +66,7 @@ def fill(stub: Any, chain: type, **options: Any) -> Callable[[Callable[..., Any]
             return function if getattr(first, "instance_class", None) is chain else None
 
         choose.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba asks for the same one
-        overload(stub, jit_options=PART | options)(choose)
-        return stub.register(chain, function)
+        overload(of, jit_options=PART | options)(choose)
+        return of.register(chain, function)
 
     return register

@@ -1,8 +1,9 @@
 """The integrators but Gauss collocation in compiled form, for every chain; their plain twins are in `discs.integrators`.
 
 Each takes `steps` steps from hi + lo and pi (or what the method remembers), in place, and returns (taken, gradients, solves,
-unconverged, lost): it stops after a step whose kinetic energy is not below `bound`, or in which disc `lost` >= 0 loses its heading:
-on the straight way that it went or, if the step did not converge or is explicit, on the way that its velocity pointed.
+unconverged, lost): it stops after a step whose kinetic energy is not below `bound`, and in one in which disc `lost` >= 0 loses its
+heading, on the straight way that it went or, if the step did not converge or is explicit, on the way that its velocity pointed (the
+moves of leapfrog are its velocity). Where the discs are means nothing then: the step may not be made, or in part.
 """
 
 import numpy as np
@@ -16,11 +17,18 @@ from discs.kernels.shared import add, ahead, back, copy, forward, kinetic, large
 def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
     """Midpoint steps of fractions of h, `discs.integrators.midpoint` and `composition`."""
     work, p, move, half = do.workspace(chain), np.empty_like(pi), np.empty_like(hi), np.empty_like(hi)
+    several = fractions.size > 1
+    first, least, rate = (np.empty_like(hi), np.empty_like(lo), np.empty_like(pi)) if several else (hi, lo, pi)  # a step's start
     still, slope, change = np.zeros_like(hi), np.zeros((2, hi.shape[1])), np.empty(hi.shape[1])
     solves, unconverged, lost = 0, 0, -1
     do.settle(chain, work, hi, lo)
     do.lost(chain, work, slope)
     for step in range(steps):
+        if several:
+            copy(hi, first)
+            copy(lo, least)
+            copy(pi, rate)
+        stuck = False
         for fraction in fractions:
             tau = fraction * h
             do.frame(chain, work, still, work.c)
@@ -33,11 +41,14 @@ def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
             solves += sweep
             if tolerance > 0 and sweep == sweeps:
                 unconverged += 1
-                do.frame(chain, work, still, work.c)
-                forward(work.c, pi, half, 0.5 * tau)
-                lost = ahead(chain, work, hi, lo, half, slope)
-                if lost >= 0:
-                    return step + 1, solves, solves, unconverged, lost
+                if not stuck:
+                    stuck = True
+                    do.settle(chain, work, first, least)
+                    do.frame(chain, work, still, work.c)
+                    forward(work.c, rate, half, 0.5 * h)
+                    lost = ahead(chain, work, first, least, half, slope)
+                    if lost >= 0:
+                        return step + 1, solves, solves, unconverged, lost
             add(hi, lo, move, 2.0)
             for row in range(pi.shape[0]):
                 for i in range(pi.shape[1]):
@@ -59,11 +70,12 @@ def rk4(chain, hi, lo, pi, h, steps, bound):
     do.settle(chain, work, hi, lo)
     do.lost(chain, work, slope)
     for step in range(steps):
-        do.frame(chain, work, still, c)
-        forward(c, pi, move, 0.5 * h)
-        lost = ahead(chain, work, hi, lo, move, slope)
-        if lost >= 0:
-            return step + 1, 4 * step, 0, 0, lost
+        if do.vanishing(chain):
+            do.frame(chain, work, still, c)
+            forward(c, pi, move, 0.5 * h)
+            lost = ahead(chain, work, hi, lo, move, slope)
+            if lost >= 0:
+                return step + 1, 4 * step, 0, 0, lost
         move[:], total[:], kick[:] = 0.0, 0.0, 0.0
         copy(pi, p)
         for i in range(4):
@@ -162,9 +174,10 @@ def perlmutter(chain, hi, lo, pi, h, steps, sweeps, tolerance, bound):
                     move[row, k] = new
                 moved = max(moved, largest(change) / chain.scale[row])
         unconverged += tolerance > 0 and sweep == sweeps
-        lost = ahead(chain, work, hi, lo, half, slope)
-        if lost >= 0:
-            return step + 1, step + 1, 0, unconverged, lost
+        if do.vanishing(chain):
+            lost = ahead(chain, work, hi, lo, half, slope)
+            if lost >= 0:
+                return step + 1, step + 1, 0, unconverged, lost
         add(hi, lo, move, 1.0)
         do.settle(chain, work, hi, lo)
         lost = do.lost(chain, work, slope)

@@ -74,6 +74,7 @@ def add(hi, lo, increment, factor):
 
 @part
 def kinetic(pi):
+    """|pi|^2/2, the kinetic energy."""
     total = 0.0
     for row in range(pi.shape[0]):
         for i in range(pi.shape[1]):
@@ -83,7 +84,7 @@ def kinetic(pi):
 
 @part
 def ahead(chain, work, hi, lo, half, slope):
-    """A disc that loses its heading if all go on straight from the base hi + lo by twice `half`, or -1; `half` is lost."""
+    """A disc that loses its heading if all go on straight from the base hi + lo by twice `half`, or -1; `half` is overwritten."""
     for row in range(hi.shape[0]):
         for i in range(hi.shape[1]):
             half[row, i] = hi[row, i] + 2 * half[row, i]

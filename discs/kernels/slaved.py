@@ -268,6 +268,11 @@ def _potential(chain, work):
     return 0.5 * total
 
 
+@fill(chain.vanishing, Slaved)
+def _vanishing(chain):
+    return chain.unit
+
+
 @fill(chain.lost, Slaved)
 def _lost(chain, work, slope):
     d, half, worst, disc = work.base, 0.5 / chain.k, 1e-6, -1

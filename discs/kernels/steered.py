@@ -1,8 +1,7 @@
 """The chain of discs with their own heading in compiled form; its derivation and its plain twin are `discs.steered`.
 
 Links are held with one more at each end: link j lies before disc j. Around a ring links 0 and n are the same; at free ends they
-have no stiffness. The cosines of a step's angles come from those of its start and of the step: two pairs for each disc and
-sweep.
+have no stiffness.
 """
 
 from typing import NamedTuple
@@ -203,6 +202,11 @@ def _potential(chain, work):
         for j in range(1, work.strain.shape[1]):
             total += chain.stiffness[row, j] * work.strain[row, j] ** 2
     return 0.5 * total
+
+
+@fill(chain.vanishing, Steered)
+def _vanishing(chain):
+    return False
 
 
 @fill(chain.lost, Steered)

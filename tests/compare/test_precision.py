@@ -65,9 +65,7 @@ def test_failures_stay_in_the_table():
     assert rows["slow", 1e-3].remark == rows["crawls", 1e-3].remark == "cut off after 5 s"
     assert rows["slow", 1e-4].remark == "cut off after 5 s; tighter left out"
     assert ("slow", 1e-5) not in rows
-    assert (
-        rows["crawls", 1e-4].seconds == rows["crawls", 1e-5].seconds == 1e-3
-    )  # as CVODE does
+    assert rows["crawls", 1e-4].seconds == rows["crawls", 1e-5].seconds == 1e-3  # as CVODE does
     assert "failed: the step became too small" in rows["broken", 1e-4].remark
     assert np.isnan(rows["broken", 1e-4].error)
     assert any(r.ours and r.method == "auto" and r.error < 1e-6 for r in study.rows)
