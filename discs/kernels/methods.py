@@ -18,16 +18,16 @@ def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
     """Midpoint steps of fractions of h, `discs.integrators.midpoint` and `composition`."""
     work, p, move, half = do.workspace(chain), np.empty_like(pi), np.empty_like(hi), np.empty_like(hi)
     several = fractions.size > 1
-    first, least, rate = (np.empty_like(hi), np.empty_like(lo), np.empty_like(pi)) if several else (hi, lo, pi)  # a step's start
+    start_hi, start_lo, start_pi = (np.empty_like(hi), np.empty_like(lo), np.empty_like(pi)) if several else (hi, lo, pi)
     still, slope, change = np.zeros_like(hi), np.zeros((2, hi.shape[1])), np.empty(hi.shape[1])
     solves, unconverged, lost = 0, 0, -1
     do.settle(chain, work, hi, lo)
     do.lost(chain, work, slope)
     for step in range(steps):
         if several:
-            copy(hi, first)
-            copy(lo, least)
-            copy(pi, rate)
+            copy(hi, start_hi)
+            copy(lo, start_lo)
+            copy(pi, start_pi)
         stuck = False
         for fraction in fractions:
             tau = fraction * h
@@ -43,10 +43,10 @@ def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
                 unconverged += 1
                 if not stuck:
                     stuck = True
-                    do.settle(chain, work, first, least)
+                    do.settle(chain, work, start_hi, start_lo)
                     do.frame(chain, work, still, work.c)
-                    forward(work.c, rate, half, 0.5 * h)
-                    lost = ahead(chain, work, first, least, half, slope)
+                    forward(work.c, start_pi, half, 0.5 * h)
+                    lost = ahead(chain, work, start_hi, start_lo, half, slope)
                     if lost >= 0:
                         return step + 1, solves, solves, unconverged, lost
             add(hi, lo, move, 2.0)
