@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export NO_MKDOCS_2_WARNING := 1
 # what touches every dependency, in some minutes, most of them for compiling with the oldest numba
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
-    $(addprefix continuum/test_, cells.py lagrangian.py))
+    $(addprefix continuum/test_, cells.py lattice.py lagrangian.py))
 
 .PHONY: run test docs minimal coverage clean
 
