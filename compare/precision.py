@@ -143,7 +143,11 @@ class WorkPrecision:
 
 
 def ours(problem: Problem) -> list[Peer]:
-    """Our methods; sweeps converge to a part of the error that a step of this length makes."""
+    """Our methods; sweeps converge to a part of the error that a step of this length makes.
+
+    What is held below the tolerance is the last change of a step; what is still wrong after it is smaller by what one more sweep
+    would gain.
+    """
     t = problem.duration
 
     def fixed(name: str, steps: Sequence[int], method: Callable[[int], Integrator]) -> Peer:
@@ -159,9 +163,9 @@ def ours(problem: Problem) -> list[Peer]:
     return [
         fixed("midpoint", many[2:], lambda m: Midpoint(tolerance=0.03 / m**2)),
         fixed("suzuki4", many[2:13], lambda m: Suzuki4(Midpoint(tolerance=max(0.01 / m**3, 1e-13)))),
-        fixed("gauss4", many[:11], lambda m: Gauss4(tolerance=max(1e-3 / m**3, 1e-13))),
-        fixed("gauss6", many[:15], lambda m: Gauss6(tolerance=max(1e-4 / m**3, 1e-13))),
-        fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(1e-5 / m**3, 1e-13))),
+        fixed("gauss4", many[:11], lambda m: Gauss4(tolerance=max(0.01 / m**3, 1e-13))),
+        fixed("gauss6", many[:15], lambda m: Gauss6(tolerance=max(0.003 / m**3, 1e-13))),
+        fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(3e-4 / m**3, 1e-13))),
         Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all its attempts are counted; the setting is tol"),
     ]
 
