@@ -3,8 +3,9 @@
 import csv
 import time as clock
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -29,23 +30,22 @@ ERRORS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 class Row(NamedTuple):
     """One method with one setting on one problem.
 
-    error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none. seconds
-    : median.
-    steps, gradients, solves : what it took, None where a peer does not tell. remark : why there is no result, or what is wrong
-    with it.
+    error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
+    seconds : median. steps, gradients, solves : what it took, None where a peer does not tell. remark : why there is no result,
+    or what is wrong with it.
     """
 
     problem: str
     n: int
     method: str
     ours: bool
-    setting: float
-    error: float
-    seconds: float
-    steps: int | None
-    gradients: int | None
-    solves: int | None
-    remark: str
+    setting: float = np.nan
+    error: float = np.nan
+    seconds: float = np.nan
+    steps: int | None = None
+    gradients: int | None = None
+    solves: int | None = None
+    remark: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,10 +229,11 @@ def work_precision(
 ) -> WorkPrecision:
     """Measure speed against error at the end of scenes.
 
-    Every method runs from loose to tight settings: once to warm up, then `repeats` times, of which the median counts. What takes
-    longer than `seconds`/(4 `repeats`) is run once. A run is cut off after `seconds`; after two such runs, or once a method has
-    taken three times that, its tighter settings are left out, and the table says so. (CVODE may crawl at one tolerance and not
-    at the next.)
+    Every method runs from loose to tight settings, once. A run is cut off after `seconds`; after two such runs, or once a method
+    has taken three times that, its tighter settings are left out, and the table says so. (CVODE may crawl at one tolerance and
+    not at the next.) What took less than `seconds`/(4 `repeats`) is then timed in `repeats` rounds, of which the median counts: a
+    round runs all methods and settings, each to warm up and then for the clock. So a machine that slows down for a minute does so
+    for all of them. What took longer has the time of its one run.
 
     Parameters
     ----------
@@ -259,42 +260,75 @@ def work_precision(
             references[name, size] = floor
             mine = ours(problem)
             others = peers(problem) if methods is None else methods(problem)
+            entries: list[_Entry] = []
             for peer in tqdm([*mine, *others], desc=f"{name}, N = {size}", disable=not progress, leave=False):
                 if peer.tells:
                     differences[peer.name] = peer.tells
-                rows += _measure(peer, name, size, exact, peer in mine, repeats, seconds)
+                entries += _first_runs(peer, Row(name, size, peer.name, peer in mine), exact, seconds)
+            quick = [entry for entry in entries if entry.row.seconds < seconds / (4 * repeats) and not np.isnan(entry.row.error)]
+            for _ in tqdm(range(repeats), desc=f"{name}, N = {size}, rounds", disable=not progress, leave=False):
+                for entry in quick:
+                    entry.run_again(seconds)
+            rows += [entry.result() for entry in entries]
     return WorkPrecision(rows, references, differences)
 
 
-def _measure(peer: Peer, name: str, n: int, exact: NDArray, ours: bool, repeats: int, limit: float) -> list[Row]:
-    """The rows of one method, from loose to tight."""
-    rows, started, cut = [], clock.perf_counter(), 0
+@dataclass(eq=False)
+class _Entry:
+    """A row with the time of its first run, how to run it again, and the times of further runs, s."""
+
+    row: Row
+    peer: Peer
+    times: list[float] = field(default_factory=list)
+
+    def run_again(self, limit: float) -> None:
+        with suppress(Cutoff), _quiet():
+            self.peer.run(self.row.setting, limit)
+            self.times.append(self.peer.run(self.row.setting, limit).seconds)
+
+    def result(self) -> Row:
+        return self.row._replace(seconds=float(np.median(self.times))) if self.times else self.row
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _first_runs(peer: Peer, blank: Row, exact: NDArray, limit: float) -> list[_Entry]:
+    """A method's runs from loose to tight."""
+    entries: list[_Entry] = []
+    started, cut = clock.perf_counter(), 0
+
+    def add(row: Row) -> None:
+        entries.append(_Entry(row, peer))
+
     for setting in peer.settings:
         begun = clock.perf_counter()
-        row = Row(name, n, peer.name, ours, setting, np.nan, np.nan, None, None, None, "")
+        row, more = blank._replace(setting=setting), setting != peer.settings[-1]
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with _quiet():
                 found = peer.run(setting, limit)
-                times = [found.seconds]
-                if found.seconds < limit / (4 * repeats):
-                    times = [peer.run(setting, limit).seconds for _ in range(repeats)]
+                if not entries:  # what a method loads and compiles at first is not part of its time
+                    found = peer.run(setting, limit)
         except Cutoff:
             cut += 1
-            remark = f"cut off after {limit:g} s" + "; tighter left out" * (cut == 2 and setting != peer.settings[-1])
-            rows.append(row._replace(seconds=clock.perf_counter() - begun, remark=remark))
+            remark = f"cut off after {limit:g} s" + "; tighter left out" * (cut == 2 and more)
+            add(row._replace(seconds=clock.perf_counter() - begun, remark=remark))
             if cut == 2:
                 break
             continue
         except (ArithmeticError, SimulationError, RuntimeError, ValueError) as error:
-            rows.append(row._replace(seconds=clock.perf_counter() - begun, remark=f"failed: {error}".replace("\n", " ")[:100]))
+            add(row._replace(seconds=clock.perf_counter() - begun, remark=f"failed: {error}".replace("\n", " ")[:100]))
             continue
         off = _distance(found.q, exact)
         tolerance = setting if setting < 1 else np.nan
         remark = "says it succeeded, and is wrong" if off > max(WRONG * tolerance, 0.01) else ""
-        row = row._replace(error=off, seconds=float(np.median(times)), steps=found.steps or None, gradients=found.gradients)
-        rows.append(row._replace(solves=found.solves, remark=remark))
-        if clock.perf_counter() - started > 3 * limit and setting != peer.settings[-1]:
-            rows.append(row._replace(error=np.nan, seconds=np.nan, remark=f"tighter left out after {3 * limit:g} s"))
+        row = row._replace(error=off, seconds=found.seconds, steps=found.steps or None, gradients=found.gradients)
+        add(row._replace(solves=found.solves, remark=remark))
+        if clock.perf_counter() - started > 3 * limit and more:
+            add(row._replace(error=np.nan, seconds=np.nan, remark=f"tighter left out after {3 * limit:g} s"))
             break
-    return rows
+    return entries

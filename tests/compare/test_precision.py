@@ -73,6 +73,28 @@ def test_failures_stay_in_the_table():
     assert "* slow: differs." in study.report()
 
 
+def test_all_methods_take_turns():
+    called: list[tuple[str, float]] = []
+
+    def peer(name: str, least: float) -> Peer:
+        def run(setting: float, seconds: float) -> Outcome:
+            called.append((name, setting))
+            return Outcome(np.ones((3, 9)), 1, 1, None, least * len(called))
+
+        return Peer(name, (1e-2, 1e-3), run)
+
+    def methods(problem: Problem) -> list[Peer]:
+        return [peer("a", 1e-4), peer("b", 1e-4), peer("slow", 0.1)]
+
+    study = work_precision({"short": untwisting_rod(duration=0.2)}, (9,), methods, repeats=3, seconds=6.0, progress=False)
+    settings = [("a", 1e-2), ("a", 1e-3), ("b", 1e-2), ("b", 1e-3)]
+    first = [("a", 1e-2), *settings[:2], ("b", 1e-2), *settings[2:], ("slow", 1e-2), ("slow", 1e-2), ("slow", 1e-3)]
+    assert called == first + 3 * [each for each in settings for _ in range(2)]  # to warm up, and for the clock
+    seconds = {(r.method, r.setting): r.seconds for r in study.rows if not r.ours}
+    assert seconds["a", 1e-2] == pytest.approx(1e-4 * 19)  # the second of three rounds of eight runs after nine
+    assert seconds["slow", 1e-3] == pytest.approx(0.9)  # of its one run
+
+
 def test_times_at_equal_error():
     def row(method: str, mine: bool, error: float, seconds: float) -> Row:
         return Row("p", 8, method, mine, 0.0, error, seconds, None, None, None, "")
