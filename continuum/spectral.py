@@ -29,6 +29,7 @@ MOST_STEPS = FEWEST * 2**10
 NODES = 1025  # of a solution, so many that splines through them do for derivatives too
 FIELDS = ("x", "y", "theta", "omega")
 POSITIONS = FIELDS[:3]
+BENT = 1e-3  # |r''| times the length at a free end, from which on a line is said to start bent there
 
 
 class Course:
@@ -47,6 +48,7 @@ class Course:
         length = scene.rod.length
         self.s = np.linspace(0, length, NODES) if not scene.closed else length / (NODES - 1) * np.arange(NODES - 1)
         self._found: dict[tuple[int, int], dict[str, Any]] = {}
+        self.hint = starts_bent(scene)
 
     def run(self, n: int, steps: int) -> dict[str, Any]:
         """Fields (F, S), energy and slip (F,); SimulationError if the motion cannot go on, or not with these steps."""
@@ -98,7 +100,7 @@ class Course:
                 "the rod lost its heading: r' = 0, and rolling='unit' has no direction there", step, step * h, node
             )
         if not taken:
-            raise SimulationError("steps do not converge: the motion is too fast for them", step, step * h, node)
+            raise SimulationError(f"steps do not converge: the motion is too fast for them{self.hint}", step, step * h, node)
 
     def effect(self, n: int, steps: int) -> dict[str, float]:
         """Of the steps on n functions: what twice as many change."""
@@ -128,7 +130,7 @@ def possible_steps(course: Course, sizes: tuple[int, ...], steps: int) -> int:
                 raise  # twice as many steps end there too
             last = error
         steps *= 2
-    raise _too_fast()
+    raise _too_fast(course)
 
 
 def enough_steps(course: Course, n: int, steps: int, tol: float) -> int:
@@ -137,14 +139,30 @@ def enough_steps(course: Course, n: int, steps: int, tol: float) -> int:
         if worst(course.effect(n, steps)) <= tol / 4:
             return steps
         steps *= 2
-    raise _too_fast()
+    raise _too_fast(course)
 
 
-def _too_fast() -> ValueError:
+def _too_fast(course: Course) -> ValueError:
     return ValueError(
         f"tol is not reached in {MOST_STEPS} time steps: the motion is too sensitive or too fast; "
-        "ask for a larger tol or a shorter duration"
+        f"ask for a larger tol or a shorter duration{course.hint}"
     )
+
+
+def starts_bent(scene: Scene) -> str:
+    """What to say of a scene that starts bent at a free end, against the end's own condition r'' = 0; empty of others."""
+    if scene.closed or not scene.rod.bending_stiffness:
+        return ""
+    length = scene.rod.length
+    inwards = 1e-3 * length * np.arange(4)
+    curved = 0.0
+    for places in (inwards, length - inwards):
+        fields = scene.fields(places)
+        r = fields["x"] + 1j * fields["y"]
+        curved = max(curved, float(abs(2 * r[0] - 5 * r[1] + 4 * r[2] - r[3])) / (1e-3 * length) ** 2)  # to (length/1000)^2
+    if curved * length < BENT:
+        return ""
+    return "; the line starts bent at a free end, where r'' = 0: it springs straight there in ever shorter waves"
 
 
 def solve_spectral(scene: Scene, tol: float, times: NDArray, progress: bool) -> Solution:
@@ -170,5 +188,6 @@ def solve_spectral(scene: Scene, tol: float, times: NDArray, progress: bool) -> 
             stats = {"method": "spectral", "order": None, "functions": n, "dt": scene.duration / steps, "steps": steps}
             return Solution(t=times, s=course.s, error_estimate=estimate, stats=stats, **found)
     raise ValueError(
-        f"tol = {tol:g} is not reached on {n} functions, where the estimated error is {worst(space):.1e}; ask for a larger tol"
+        f"tol = {tol:g} is not reached on {n} functions, where the estimated error is {worst(space):.1e}; "
+        f"ask for a larger tol{course.hint}"
     )

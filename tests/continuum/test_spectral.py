@@ -1,5 +1,6 @@
 """Galerkin's method for slaved headings: its functions, its tolerance, against exact rings and against chains of discs."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,7 +12,7 @@ from continuum.bases import polynomials, waves
 from continuum.galerkin import SpectralRod
 from continuum.kernels.collocation import gauss
 from continuum.scenes import PAPER
-from continuum.spectral import Course
+from continuum.spectral import Course, starts_bent
 from discs import Gauss6, Gauss8, SimulationError
 from discs.integrators.base import Work
 from discs.integrators.gauss import tableau
@@ -146,6 +147,18 @@ def bent(s):
     places = np.outer(s, (u + 1) / 2)
     z = np.exp(0.6j * (places - 3 / (2 * np.pi) * np.sin(2 * np.pi * places / 3))) @ w * s / 2
     return z.real, z.imag, 0 * s, 0.3 + 0.9 * np.cos(np.pi * s / 3)
+
+
+def test_a_line_that_starts_bent_at_a_free_end_is_named(rolling):
+    def arc(s):
+        return 2.5 * np.sin(0.4 * s), 2.5 * (1 - np.cos(0.4 * s)), 0 * s, 0.4 + 0 * s
+
+    start = Scene(rod=Rod(**PAPER | {"radius": 0.5}), initial=arc, duration=400.0, rolling=rolling)
+    with pytest.raises(SimulationError, match=r"steps do not converge.*starts bent at a free end"), np.errstate(all="ignore"):
+        Course(start, np.array([400.0]), 1e-8, tqdm(disable=True)).run(15, 40)
+    straight = [untwisting_rod(rolling), breathing_ring(rolling), replace(start, initial=bent, rod=replace(start.rod, length=3.0))]
+    unbending = replace(start, rod=replace(start.rod, bending_stiffness=0.0))
+    assert not any(starts_bent(scene) for scene in [*straight, unbending])
 
 
 def held_out():
