@@ -121,17 +121,25 @@ def write_stability(found: Stability, out: str) -> None:
 
 
 def run_precision(options: argparse.Namespace) -> None:
-    """Measure speed against error and write table and picture."""
+    """Measure speed against error and write table and picture; what an interrupted run has finished is written too."""
+    found, stopped = precision.WorkPrecision([], {}, {}), False
     with fresh_files(options.out) as folder:
         scenes = {law: LAWS[law]() for law in options.laws}
-        found = precision.work_precision(
-            scenes, tuple(options.n), repeats=options.repeats, seconds=options.seconds, progress=not options.quiet
-        )
+        try:
+            precision.work_precision(
+                scenes, tuple(options.n), None, options.repeats, options.seconds, not options.quiet, into=found
+            )
+        except KeyboardInterrupt:
+            if not found.rows:
+                raise
+            stopped = True
         found.save(folder / "precision.csv")
         found.plot(folder / "precision.png")
         (folder / "precision.md").write_text(found.report(), encoding="utf-8")
     print(found.report())
     print(f"\nwritten to {options.out}: precision.csv, precision.png, precision.md")
+    if stopped:
+        raise KeyboardInterrupt("interrupted: that is what was finished")
 
 
 def run_report(options: argparse.Namespace) -> None:

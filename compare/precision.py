@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,11 +15,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from compare import figures
+from compare.entrants import ours, peers
 from compare.lump import lump
-from compare.peers import multipliers, reduced
-from compare.peers.peer import Cutoff, Outcome, Peer
+from compare.peers.peer import Cutoff, Peer
 from continuum import Scene
-from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, SimulationError, Suzuki4, checks, simulate
+from discs import Gauss8, Problem, SimulationError, checks, simulate
 
 SIZES = (32, 128, 512, 2048)
 WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
@@ -142,69 +141,6 @@ class WorkPrecision:
         return axes
 
 
-def ours(problem: Problem) -> list[Peer]:
-    """Our methods; sweeps converge to a part of the error that a step of this length makes.
-
-    What is held below the tolerance is the last change of a step; what is still wrong after it is smaller by what one more sweep
-    would gain.
-    """
-    t = problem.duration
-
-    def fixed(name: str, steps: Sequence[int], method: Callable[[int], Integrator]) -> Peer:
-        def run(setting: float, seconds: float) -> Outcome:
-            return _outcome(problem, lambda: simulate(problem, method(int(setting)), t / setting, frames=1, progress=False))
-
-        return Peer(name, tuple(map(float, steps)), run)
-
-    def to_tolerance(setting: float, seconds: float) -> Outcome:
-        return _outcome(problem, lambda: simulate(problem, "auto", tol=setting, frames=1, progress=False))
-
-    many = [round(6 * 2 ** (j / 2)) for j in range(17)]
-    return [
-        fixed("midpoint", many[2:], lambda m: Midpoint(tolerance=0.03 / m**2)),
-        fixed("suzuki4", many[2:13], lambda m: Suzuki4(Midpoint(tolerance=max(0.01 / m**3, 1e-13)))),
-        fixed("gauss4", many[:11], lambda m: Gauss4(tolerance=max(0.01 / m**3, 1e-13))),
-        fixed("gauss6", many[:15], lambda m: Gauss6(tolerance=max(0.003 / m**3, 1e-13))),
-        fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(3e-4 / m**3, 1e-13))),
-        Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all its attempts are counted; the setting is tol"),
-    ]
-
-
-def _outcome(problem: Problem, run: Callable) -> Outcome:
-    begun = clock.perf_counter()
-    found = run()
-    spent = clock.perf_counter() - begun
-    if found.stats["unconverged"]:
-        raise ArithmeticError(f"{found.stats['unconverged']} steps did not converge")
-    q = np.array([getattr(found, row)[-1] for row in problem.system.rows])
-    return Outcome(q, found.stats["steps"], found.stats["gradients"], found.stats["solves"], spent)
-
-
-def peers(problem: Problem) -> list[Peer]:
-    """The peers that are installed and can express the problem, at sizes they can bear."""
-    f = reduced.Bound(problem)
-    n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
-    found = reduced.scipy_peers(problem, f)
-    if find_spec("sksundae"):
-        found += [*reduced.sundials_peers(problem, f), multipliers.multiplier_peer(problem)]
-    if find_spec("diffrax") and problem.chain.ends == "springs":
-        from compare.peers.in_jax import diffrax_peers
-
-        found += diffrax_peers(problem)
-    if find_spec("exudyn"):
-        from compare.peers.exudyn_chain import exudyn_steered_peer
-        from compare.peers.exudyn_field import exudyn_field_peer
-
-        found.append(exudyn_field_peer(problem) if slaved else exudyn_steered_peer(problem))
-    if find_spec("mujoco") and n <= 512 and not (isinstance(problem.chain, Chain) and problem.chain.rolling == "field"):
-        from compare.peers.mujoco_discs import mujoco_peer
-
-        found += [mujoco_peer(problem), mujoco_peer(problem, second_order=False)]
-    if n <= 128:
-        found.append(multipliers.saddle_peer(problem))
-    return found
-
-
 def reference(problem: Problem) -> tuple[NDArray, float]:
     """Positions at the end by "gauss8" with short steps, (rows, n), and what halving them changes."""
     found = []
@@ -226,6 +162,7 @@ def work_precision(
     repeats: int = 5,
     seconds: float = 10.0,
     progress: bool = True,
+    into: WorkPrecision | None = None,
 ) -> WorkPrecision:
     """Measure speed against error at the end of scenes.
 
@@ -243,6 +180,7 @@ def work_precision(
     repeats : how often each run is timed.
     seconds : the longest time for one run; three times that for all runs of a method on a problem.
     progress : show a progress bar.
+    into : filled and returned, problem by problem, so that an interrupted run leaves those it has finished; a new one by default.
 
     Raises
     ------
@@ -251,26 +189,24 @@ def work_precision(
     checks.whole("repeats", repeats, 1)
     checks.number("seconds", seconds, positive=True)
     named = scenes if isinstance(scenes, dict) else {scenes.name: scenes}
-    rows: list[Row] = []
-    references, differences = {}, {}
+    into = WorkPrecision([], {}, {}) if into is None else into
     for name, scene in named.items():
         for size in n:
             problem = lump(scene, size)
             exact, floor = reference(problem)
-            references[name, size] = floor
             mine = ours(problem)
             others = peers(problem) if methods is None else methods(problem)
             entries: list[_Entry] = []
             for peer in tqdm([*mine, *others], desc=f"{name}, N = {size}", disable=not progress, leave=False):
-                if peer.tells:
-                    differences[peer.name] = peer.tells
                 entries += _first_runs(peer, Row(name, size, peer.name, peer in mine), exact, seconds)
             quick = [entry for entry in entries if entry.row.seconds < seconds / (4 * repeats) and not np.isnan(entry.row.error)]
             for _ in tqdm(range(repeats), desc=f"{name}, N = {size}, rounds", disable=not progress, leave=False):
                 for entry in quick:
                     entry.run_again(seconds)
-            rows += [entry.result() for entry in entries]
-    return WorkPrecision(rows, references, differences)
+            into.rows.extend(entry.result() for entry in entries)
+            into.references[name, size] = floor
+            into.differences.update({peer.name: peer.tells for peer in [*mine, *others] if peer.tells})
+    return into
 
 
 @dataclass(eq=False)

@@ -7,9 +7,10 @@ import pytest
 
 from compare import lump, work_precision
 from compare.__main__ import main
+from compare.entrants import ours, peers
 from compare.peers import reduced
 from compare.peers.peer import Cutoff, Outcome, Peer
-from compare.precision import Row, WorkPrecision, ours, peers, reference
+from compare.precision import Row, WorkPrecision, reference
 from continuum import untwisting_rod
 from discs import Problem
 from discs.kernels import methods
@@ -131,3 +132,21 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert (out / "precision.csv").read_text().startswith("problem,n,method,ours,setting,error,seconds")
     assert main(["precision", "--n", "9", "--repeats", "0", "--quiet", "--out", str(out)]) == 2
     assert "repeats must be a whole number" in capsys.readouterr().err
+
+
+def test_an_interrupted_run_leaves_what_it_has_finished(tmp_path, capsys, monkeypatch):
+    out, arguments = tmp_path / "out", ["precision", "--laws", "field", "--repeats", "1", "--seconds", "0.5", "--quiet"]
+
+    def interrupted(problem: Problem) -> list[Peer]:
+        if problem.chain.n == 9:
+            return []
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("compare.precision.peers", interrupted)
+    assert main([*arguments, "--n", "10", "9", "--out", str(out)]) == 130
+    assert not out.exists()
+    assert main([*arguments, "--n", "9", "10", "--out", str(out)]) == 130
+    assert "that is what was finished" in capsys.readouterr().err
+    sizes = [line.split(",")[1] for line in (out / "precision.csv").read_text().splitlines()]
+    assert set(sizes) == {"n", "9"}
+    assert sorted(p.name for p in out.iterdir()) == ["precision.csv", "precision.md", "precision.png"]

@@ -1,0 +1,74 @@
+"""Who takes part where speed is measured against error: our methods, and the peers that are installed."""
+
+import time as clock
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+
+import numpy as np
+
+from compare.peers import multipliers, reduced
+from compare.peers.peer import Outcome, Peer
+from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, Suzuki4, simulate
+
+
+def ours(problem: Problem) -> list[Peer]:
+    """Our methods; sweeps converge to a part of the error that a step of this length makes.
+
+    What is held below the tolerance is the last change of a step; what is still wrong after it is smaller by what one more sweep
+    would gain.
+    """
+    t = problem.duration
+
+    def fixed(name: str, steps: Sequence[int], method: Callable[[int], Integrator]) -> Peer:
+        def run(setting: float, seconds: float) -> Outcome:
+            return _outcome(problem, lambda: simulate(problem, method(int(setting)), t / setting, frames=1, progress=False))
+
+        return Peer(name, tuple(map(float, steps)), run)
+
+    def to_tolerance(setting: float, seconds: float) -> Outcome:
+        return _outcome(problem, lambda: simulate(problem, "auto", tol=setting, frames=1, progress=False))
+
+    many = [round(6 * 2 ** (j / 2)) for j in range(17)]
+    return [
+        fixed("midpoint", many[2:], lambda m: Midpoint(tolerance=0.03 / m**2)),
+        fixed("suzuki4", many[2:13], lambda m: Suzuki4(Midpoint(tolerance=max(0.01 / m**3, 1e-13)))),
+        fixed("gauss4", many[:11], lambda m: Gauss4(tolerance=max(0.01 / m**3, 1e-13))),
+        fixed("gauss6", many[:15], lambda m: Gauss6(tolerance=max(0.003 / m**3, 1e-13))),
+        fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(3e-4 / m**3, 1e-13))),
+        Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all its attempts are counted; the setting is tol"),
+    ]
+
+
+def _outcome(problem: Problem, run: Callable) -> Outcome:
+    begun = clock.perf_counter()
+    found = run()
+    spent = clock.perf_counter() - begun
+    if found.stats["unconverged"]:
+        raise ArithmeticError(f"{found.stats['unconverged']} steps did not converge")
+    q = np.array([getattr(found, row)[-1] for row in problem.system.rows])
+    return Outcome(q, found.stats["steps"], found.stats["gradients"], found.stats["solves"], spent)
+
+
+def peers(problem: Problem) -> list[Peer]:
+    """The peers that are installed and can express the problem, at sizes they can bear."""
+    f = reduced.Bound(problem)
+    n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
+    found = reduced.scipy_peers(problem, f)
+    if find_spec("sksundae"):
+        found += [*reduced.sundials_peers(problem, f), multipliers.multiplier_peer(problem)]
+    if find_spec("diffrax") and problem.chain.ends == "springs":
+        from compare.peers.in_jax import diffrax_peers
+
+        found += diffrax_peers(problem)
+    if find_spec("exudyn"):
+        from compare.peers.exudyn_chain import exudyn_steered_peer
+        from compare.peers.exudyn_field import exudyn_field_peer
+
+        found.append(exudyn_field_peer(problem) if slaved else exudyn_steered_peer(problem))
+    if find_spec("mujoco") and n <= 512 and not (isinstance(problem.chain, Chain) and problem.chain.rolling == "field"):
+        from compare.peers.mujoco_discs import mujoco_peer
+
+        found += [mujoco_peer(problem), mujoco_peer(problem, second_order=False)]
+    if n <= 128:
+        found.append(multipliers.saddle_peer(problem))
+    return found
