@@ -77,7 +77,9 @@ def add_precision(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--laws", metavar="LAW", nargs="+", choices=LAWS, default=list(LAWS), help=f"of {', '.join(LAWS)} (default: all)"
     )
-    p.add_argument("--repeats", metavar="M", type=int, default=5, help="timed runs of each setting (default: 5)")
+    p.add_argument(
+        "--repeats", metavar="M", type=int, default=5, help="rounds that time each setting; long runs have one time (default: 5)"
+    )
     p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run, s (default: 10)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_precision)
@@ -121,8 +123,8 @@ def write_stability(found: Stability, out: str) -> None:
 
 
 def run_precision(options: argparse.Namespace) -> None:
-    """Measure speed against error and write table and picture; what an interrupted run has finished is written too."""
-    found, stopped = precision.WorkPrecision([], {}, {}), False
+    """Measure speed against error and write table and picture; what an interrupted run has finished goes to files of its own."""
+    found, name, stopped = precision.WorkPrecision([], {}, {}), "precision", False
     with fresh_files(options.out) as folder:
         scenes = {law: LAWS[law]() for law in options.laws}
         try:
@@ -132,12 +134,12 @@ def run_precision(options: argparse.Namespace) -> None:
         except KeyboardInterrupt:
             if not found.rows:
                 raise
-            stopped = True
-        found.save(folder / "precision.csv")
-        found.plot(folder / "precision.png")
-        (folder / "precision.md").write_text(found.report(), encoding="utf-8")
+            name, stopped = "precision-partial", True
+        found.save(folder / f"{name}.csv")
+        found.plot(folder / f"{name}.png")
+        (folder / f"{name}.md").write_text(found.report(), encoding="utf-8")
     print(found.report())
-    print(f"\nwritten to {options.out}: precision.csv, precision.png, precision.md")
+    print(f"\nwritten to {options.out}: {name}.csv, {name}.png, {name}.md")
     if stopped:
         raise KeyboardInterrupt("interrupted: that is what was finished")
 

@@ -12,10 +12,10 @@ from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, 
 
 
 def ours(problem: Problem) -> list[Peer]:
-    """Our methods; sweeps converge to a part of the error that a step of this length makes.
+    """Our methods; sweeps stop at a change that falls with the step.
 
-    What is held below the tolerance is the last change of a step; what is still wrong after it is smaller by what one more sweep
-    would gain.
+    What is still wrong after the last change is smaller by what one more sweep would gain. The tolerances are chosen for these
+    scenes, as short time for its error goes; "auto" has none that are.
     """
     t = problem.duration
 

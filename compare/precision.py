@@ -23,6 +23,7 @@ from discs import Gauss8, Problem, SimulationError, checks, simulate
 
 SIZES = (32, 128, 512, 2048)
 WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
+FAILURES = (ArithmeticError, SimulationError, RuntimeError, ValueError)  # of a run, that stay in the table
 ERRORS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 
 
@@ -30,8 +31,8 @@ class Row(NamedTuple):
     """One method with one setting on one problem.
 
     error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
-    seconds : median. steps, gradients, solves : what it took, None where a peer does not tell. remark : why there is no result,
-    or what is wrong with it.
+    seconds : median of the rounds, or of the one run there is. steps, gradients, solves : what it took, None where a peer does not
+    tell. remark : why there is no result, or what is wrong with it.
     """
 
     problem: str
@@ -121,7 +122,8 @@ class WorkPrecision:
                 f"Ours against the fastest peer at equal error. Reference: gauss8 with short steps, off by at most {floor:.1e}.",
                 self.speedups(),
                 *(f"* {name}: {how}." for name, how in self.differences.items()),
-                "All runs; errors relative to the largest value of each of x, y, θ (φ), times are medians.",
+                "All runs; errors relative to the largest value of each of x, y, θ (φ); times are medians, of long runs and "
+                "failures the one time there is.",
                 self.table(),
             ]
         )
@@ -170,14 +172,14 @@ def work_precision(
     has taken three times that, its tighter settings are left out, and the table says so. (CVODE may crawl at one tolerance and
     not at the next.) What took less than `seconds`/(4 `repeats`) is then timed in `repeats` rounds, of which the median counts: a
     round runs all methods and settings, each to warm up and then for the clock. So a machine that slows down for a minute does so
-    for all of them. What took longer has the time of its one run.
+    for all of them. What took longer has the time of its one run, with whatever the machine did then.
 
     Parameters
     ----------
     scenes : a scene, or several by name.
     n : numbers of discs, with plain springs at free ends.
     methods : problem -> methods to run; None takes ours and the peers that are installed.
-    repeats : how often each run is timed.
+    repeats : rounds, how often each short run is timed.
     seconds : the longest time for one run; three times that for all runs of a method on a problem.
     progress : show a progress bar.
     into : filled and returned, problem by problem, so that an interrupted run leaves those it has finished; a new one by default.
@@ -218,7 +220,7 @@ class _Entry:
     times: list[float] = field(default_factory=list)
 
     def run_again(self, limit: float) -> None:
-        with suppress(Cutoff), _quiet():
+        with suppress(Cutoff, *FAILURES), _quiet():
             self.peer.run(self.row.setting, limit)
             self.times.append(self.peer.run(self.row.setting, limit).seconds)
 
@@ -248,6 +250,7 @@ def _first_runs(peer: Peer, blank: Row, exact: NDArray, limit: float) -> list[_E
             with _quiet():
                 found = peer.run(setting, limit)
                 if not entries:  # what a method loads and compiles at first is not part of its time
+                    started = clock.perf_counter()
                     found = peer.run(setting, limit)
         except Cutoff:
             cut += 1
@@ -256,7 +259,7 @@ def _first_runs(peer: Peer, blank: Row, exact: NDArray, limit: float) -> list[_E
             if cut == 2:
                 break
             continue
-        except (ArithmeticError, SimulationError, RuntimeError, ValueError) as error:
+        except FAILURES as error:
             add(row._replace(seconds=clock.perf_counter() - begun, remark=f"failed: {error}".replace("\n", " ")[:100]))
             continue
         off = _distance(found.q, exact)
@@ -265,6 +268,6 @@ def _first_runs(peer: Peer, blank: Row, exact: NDArray, limit: float) -> list[_E
         row = row._replace(error=off, seconds=found.seconds, steps=found.steps or None, gradients=found.gradients)
         add(row._replace(solves=found.solves, remark=remark))
         if clock.perf_counter() - started > 3 * limit and more:
-            add(row._replace(error=np.nan, seconds=np.nan, remark=f"tighter left out after {3 * limit:g} s"))
+            add(blank._replace(setting=setting, remark=f"tighter left out after {3 * limit:g} s"))
             break
     return entries

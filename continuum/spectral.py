@@ -29,7 +29,7 @@ MOST_STEPS = FEWEST * 2**10
 NODES = 1025  # of a solution, so many that splines through them do for derivatives too
 FIELDS = ("x", "y", "theta", "omega")
 POSITIONS = FIELDS[:3]
-BENT = 1e-3  # |r''| times the length at a free end, from which on a line is said to start bent there
+BENT = 1e-3  # curvature times the length at a free end, from which on a line is said to start bent there
 
 
 class Course:
@@ -48,7 +48,7 @@ class Course:
         length = scene.rod.length
         self.s = np.linspace(0, length, NODES) if not scene.closed else length / (NODES - 1) * np.arange(NODES - 1)
         self._found: dict[tuple[int, int], dict[str, Any]] = {}
-        self.hint = starts_bent(scene)
+        self.hint = bent_hint(scene)
 
     def run(self, n: int, steps: int) -> dict[str, Any]:
         """Fields (F, S), energy and slip (F,); SimulationError if the motion cannot go on, or not with these steps."""
@@ -149,20 +149,21 @@ def _too_fast(course: Course) -> ValueError:
     )
 
 
-def starts_bent(scene: Scene) -> str:
-    """What to say of a scene that starts bent at a free end, against the end's own condition r'' = 0; empty of others."""
-    if scene.closed or not scene.rod.bending_stiffness:
+def bent_hint(scene: Scene) -> str:
+    """What to say of a scene that starts bent at a free end, against the end's condition x'y'' = y'x''; empty of others."""
+    if scene.closed or not scene.rod.bending_stiffness or not scene.rod.radius:
         return ""
     length = scene.rod.length
-    inwards = 1e-3 * length * np.arange(4)
-    curved = 0.0
-    for places in (inwards, length - inwards):
+    d = 1e-4 * length
+    curvature = 0.0
+    for places in (d * np.arange(4), length - d * np.arange(4)):
         fields = scene.fields(places)
         r = fields["x"] + 1j * fields["y"]
-        curved = max(curved, float(abs(2 * r[0] - 5 * r[1] + 4 * r[2] - r[3])) / (1e-3 * length) ** 2)  # to (length/1000)^2
-    if curved * length < BENT:
+        slope, bend = (-3 * r[0] + 4 * r[1] - r[2]) / (2 * d), (2 * r[0] - 5 * r[1] + 4 * r[2] - r[3]) / d**2  # to d^2
+        curvature = max(curvature, float(abs((slope.conjugate() * bend).imag)) / max(float(abs(slope)) ** 2, 1e-300))
+    if curvature * length < BENT:
         return ""
-    return "; the line starts bent at a free end, where r'' = 0: it springs straight there in ever shorter waves"
+    return "; the line starts bent at a free end, which may be why: the end has no curvature and sends out ever shorter waves"
 
 
 def solve_spectral(scene: Scene, tol: float, times: NDArray, progress: bool) -> Solution:

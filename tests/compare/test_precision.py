@@ -147,6 +147,6 @@ def test_an_interrupted_run_leaves_what_it_has_finished(tmp_path, capsys, monkey
     assert not out.exists()
     assert main([*arguments, "--n", "9", "10", "--out", str(out)]) == 130
     assert "that is what was finished" in capsys.readouterr().err
-    sizes = [line.split(",")[1] for line in (out / "precision.csv").read_text().splitlines()]
+    sizes = [line.split(",")[1] for line in (out / "precision-partial.csv").read_text().splitlines()]
     assert set(sizes) == {"n", "9"}
-    assert sorted(p.name for p in out.iterdir()) == ["precision.csv", "precision.md", "precision.png"]
+    assert sorted(p.name for p in out.iterdir()) == [f"precision-partial.{end}" for end in ("csv", "md", "png")]
