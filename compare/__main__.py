@@ -78,7 +78,7 @@ def add_precision(p: argparse.ArgumentParser) -> None:
         "--laws", metavar="LAW", nargs="+", choices=LAWS, default=list(LAWS), help=f"of {', '.join(LAWS)} (default: all)"
     )
     p.add_argument(
-        "--repeats", metavar="M", type=int, default=5, help="rounds that time each setting; long runs have one time (default: 5)"
+        "--repeats", metavar="M", type=int, default=5, help="rounds that time each setting; long runs have two times (default: 5)"
     )
     p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run, s (default: 10)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")

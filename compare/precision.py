@@ -31,8 +31,8 @@ class Row(NamedTuple):
     """One method with one setting on one problem.
 
     error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
-    seconds : median of the rounds, or of the one run there is. steps, gradients, solves : what it took, None where a peer does not
-    tell. remark : why there is no result, or what is wrong with it.
+    seconds : median of the rounds, or mean of a long run's two times. steps, gradients, solves : what it took, None where a peer
+    does not tell. remark : why there is no result, or what is wrong with it.
     """
 
     problem: str
@@ -122,8 +122,8 @@ class WorkPrecision:
                 f"Ours against the fastest peer at equal error. Reference: gauss8 with short steps, off by at most {floor:.1e}.",
                 self.speedups(),
                 *(f"* {name}: {how}." for name, how in self.differences.items()),
-                "All runs; errors relative to the largest value of each of x, y, θ (φ); times are medians, of long runs and "
-                "failures the one time there is.",
+                "All runs; errors relative to the largest value of each of x, y, θ (φ); times are medians, "
+                "of long runs means of two.",
                 self.table(),
             ]
         )
@@ -172,7 +172,7 @@ def work_precision(
     has taken three times that, its tighter settings are left out, and the table says so. (CVODE may crawl at one tolerance and
     not at the next.) What took less than `seconds`/(4 `repeats`) is then timed in `repeats` rounds, of which the median counts: a
     round runs all methods and settings, each to warm up and then for the clock. So a machine that slows down for a minute does so
-    for all of them. What took longer has the time of its one run, with whatever the machine did then.
+    for all of them. What took longer runs once more, in the first round, and has the mean of its two times.
 
     Parameters
     ----------
@@ -201,10 +201,13 @@ def work_precision(
             entries: list[_Entry] = []
             for peer in tqdm([*mine, *others], desc=f"{name}, N = {size}", disable=not progress, leave=False):
                 entries += _first_runs(peer, Row(name, size, peer.name, peer in mine), exact, seconds)
-            quick = [entry for entry in entries if entry.row.seconds < seconds / (4 * repeats) and not np.isnan(entry.row.error)]
-            for _ in tqdm(range(repeats), desc=f"{name}, N = {size}, rounds", disable=not progress, leave=False):
-                for entry in quick:
-                    entry.run_again(seconds)
+            timed = [entry for entry in entries if not np.isnan(entry.row.error)]
+            for turn in tqdm(range(repeats), desc=f"{name}, N = {size}, rounds", disable=not progress, leave=False):
+                for entry in timed:
+                    if entry.row.seconds < seconds / (4 * repeats):
+                        entry.run_again(seconds)
+                    elif not turn:
+                        entry.run_once_more(seconds)
             into.rows.extend(entry.result() for entry in entries)
             into.references[name, size] = floor
             into.differences.update({peer.name: peer.tells for peer in [*mine, *others] if peer.tells})
@@ -213,15 +216,22 @@ def work_precision(
 
 @dataclass(eq=False)
 class _Entry:
-    """A row with the time of its first run, how to run it again, and the times of further runs, s."""
+    """A row with the time of its first run, how to run it again, and the times that count, s."""
 
     row: Row
     peer: Peer
     times: list[float] = field(default_factory=list)
 
     def run_again(self, limit: float) -> None:
+        """To warm up, and for the clock."""
         with suppress(Cutoff, *FAILURES), _quiet():
             self.peer.run(self.row.setting, limit)
+            self.times.append(self.peer.run(self.row.setting, limit).seconds)
+
+    def run_once_more(self, limit: float) -> None:
+        """Without warming up; the first run counts too."""
+        self.times.append(self.row.seconds)
+        with suppress(Cutoff, *FAILURES), _quiet():
             self.times.append(self.peer.run(self.row.setting, limit).seconds)
 
     def result(self) -> Row:

@@ -90,10 +90,11 @@ def test_all_methods_take_turns():
     study = work_precision({"short": untwisting_rod(duration=0.2)}, (9,), methods, repeats=3, seconds=6.0, progress=False)
     settings = [("a", 1e-2), ("a", 1e-3), ("b", 1e-2), ("b", 1e-3)]
     first = [("a", 1e-2), *settings[:2], ("b", 1e-2), *settings[2:], ("slow", 1e-2), ("slow", 1e-2), ("slow", 1e-3)]
-    assert called == first + 3 * [each for each in settings for _ in range(2)]  # to warm up, and for the clock
+    turn = [each for each in settings for _ in range(2)]  # to warm up, and for the clock
+    assert called == first + turn + [("slow", 1e-2), ("slow", 1e-3)] + 2 * turn
     seconds = {(r.method, r.setting): r.seconds for r in study.rows if not r.ours}
-    assert seconds["a", 1e-2] == pytest.approx(1e-4 * 19)  # the second of three rounds of eight runs after nine
-    assert seconds["slow", 1e-3] == pytest.approx(0.9)  # of its one run
+    assert seconds["a", 1e-2] == pytest.approx(1e-4 * 21)  # the second of three rounds
+    assert seconds["slow", 1e-3] == pytest.approx(0.1 * (9 + 19) / 2)  # the mean of its two runs
 
 
 def test_times_at_equal_error():
