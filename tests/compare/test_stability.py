@@ -115,10 +115,11 @@ def test_peers():
     assert 1e-12 < found.error < 1e-4  # its tolerance, not rounding
 
 
-@pytest.mark.parametrize(("name", "method"), [("long time", "leapfrog"), ("rough random roll", "auto")])
-def test_slow_runs_of_ours_are_not_begun(name, method):
+@pytest.mark.parametrize(("name", "method", "limit"), [("long time", "leapfrog", 0.01), ("rough random roll", "auto", 0.05)])
+def test_slow_runs_of_ours_are_not_begun(name, method, limit):
+    """They take 0.03 and 0.5 s on a fast core."""
     (case,) = (c for c in SMALL if c.name == name)
-    found = case.run(method, 0.05)
+    found = case.run(method, limit)
     assert found.outcome == "cut off"
     assert "foretold" in found.says
     assert found.seconds > 0.01
