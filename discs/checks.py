@@ -1,7 +1,7 @@
 """Refusing bad input: what is required, what was given, what to do."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,3 +73,23 @@ def iteration(sweeps: object, tolerance: object) -> None:
     whole("sweeps", sweeps, 1)
     if number("tolerance", tolerance) < 0:
         raise ValueError(f"tolerance must be at least 0; got {tolerance!r}")
+
+
+def tolerances(tol: object, known: Iterable[str], usual: Iterable[str], least: float) -> dict[str, float]:
+    """The tolerance of each quantity that `tol` binds, else raise ValueError.
+
+    A number binds the `usual` quantities; a mapping {"omega": 1e-4} binds those that it names, of the `known` ones. None may be
+    below `least`, what doubles can reach.
+    """
+    known = tuple(known)
+    if isinstance(tol, Mapping):
+        if not tol:
+            raise ValueError(f"tol must name at least one of {', '.join(map(repr, known))}; got {tol!r}")
+        bound = {choice("tol", name, known): number(f"tol of {name!r}", value, positive=True) for name, value in tol.items()}
+    else:
+        bound = dict.fromkeys(usual, number("tol", tol, positive=True))
+    for name, value in bound.items():
+        if value < least:
+            of = f" of {name!r}" if isinstance(tol, Mapping) else ""
+            raise ValueError(f"tol{of} must be at least {least:g}, as positions are rounded; got {value:g}")
+    return bound

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from discs import stencils
 from discs.chain import Chain
+from discs.kernels.limits import LOST_HEADING
 from discs.springs import LinearCurvature, TrueCurvature
 from discs.system import Placed, RollingDiscs, folded
 
@@ -97,7 +98,7 @@ class SlavedSystem(RollingDiscs):
         return np.sqrt(self.inertia(self.contact(shape))) * rates[0]
 
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
-        """Under the unit law: a disc whose r', on the straight way between two configurations, comes below 1e-3."""
+        """Under the unit law: a disc whose r', on the straight way between two configurations, comes below `LOST_HEADING`."""
         if not self.vanishing:
             return None
         a, b = (self.slope(self.shape(z.hi, z.lo)) for z in (before, after))
@@ -105,7 +106,7 @@ class SlavedSystem(RollingDiscs):
         square = np.maximum((move * move).sum(axis=0), 1e-300)
         nearest = np.hypot(*(a + move * np.clip(-(a * move).sum(axis=0) / square, 0.0, 1.0)))
         disc = int(np.argmin(nearest))
-        return disc if nearest[disc] < 1e-3 else None
+        return disc if nearest[disc] < LOST_HEADING else None
 
     # Springs
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from discs.chain import Chain
 from discs.kernels import chain
 from discs.kernels.compiled import fill, part
+from discs.kernels.limits import LOST_HEADING
 from discs.kernels.shared import renew
 from discs.kernels.slaved_matrix import GHOST, PLAIN, RING, Matrix, assemble, factor, solve
 from discs.springs import LinearCurvature
@@ -275,7 +276,7 @@ def _vanishing(chain):
 
 @fill(chain.lost, Slaved)
 def _lost(chain, work, slope):
-    d, half, worst, disc = work.base, 0.5 / chain.k, 1e-6, -1
+    d, half, worst, disc = work.base, 0.5 / chain.k, LOST_HEADING**2, -1
     if not chain.unit:
         return disc
     for i in range(slope.shape[1]):

@@ -131,6 +131,21 @@ def test_every_method_stops_at_the_collapse(method, engine):
     assert caught.value.time == pytest.approx(between)
 
 
+@pytest.mark.parametrize("engine", ["compiled", "plain"])
+@pytest.mark.parametrize("method", ["midpoint", "gauss6", "rk4"])
+def test_a_heading_is_lost_at_a_slope_of_a_thousandth(method, engine):
+    """Three discs at rest, without springs, the outer two nearly in one place: only the threshold decides."""
+    chain = Chain(**PARAMETERS | {"n": 3, "rolling": "unit", "torsion_stiffness": 0.0, "bending_stiffness": 0.0})
+
+    def resting(slope):
+        y = slope * chain.k * np.arange(3)
+        return Problem(chain, State([0.0, chain.k, 0.0], y, np.zeros(3)), 1.0)
+
+    simulate(resting(1.1e-3), method, 0.1, 1, progress=False, engine=engine)
+    with pytest.raises(SimulationError, match="lost its heading"):
+        simulate(resting(0.9e-3), method, 0.1, 1, progress=False, engine=engine)
+
+
 def test_rest_stays_at_rest():
     chain = Chain(**PARAMETERS)
     run = simulate(Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 5.0), progress=False)

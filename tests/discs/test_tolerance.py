@@ -5,7 +5,7 @@ import pytest
 
 from compare import lump
 from continuum import breathing_ring, steered_rod, untwisting_rod
-from discs import Gauss6, Gauss8, SimulationError, simulate
+from discs import Gauss6, Gauss8, SimulationError, checks, simulate
 from tests.conftest import Model, models, uneven
 
 
@@ -43,6 +43,30 @@ def test_a_method_of_one_s_own_choice(method, model):
     run = simulate(problem, method, tol=1e-4, frames=3, progress=False)
     assert true_error(problem, run) <= 1e-4
     assert run.stats["method"] == getattr(method, "name", method)
+
+
+@pytest.mark.parametrize(
+    ("tol", "bound"),
+    [(1e-3, {"x": 1e-3, "y": 1e-3}), ({"omega": 1e-4}, {"omega": 1e-4}), ({"x": 1, "omega": 2e-5}, {"x": 1.0, "omega": 2e-5})],
+)
+def test_tolerances_of_quantities(tol, bound):
+    assert checks.tolerances(tol, ("x", "y", "omega"), ("x", "y"), 1e-12) == bound
+
+
+@pytest.mark.parametrize(
+    ("tol", "message"),
+    [
+        ({"spin": 1e-3}, "tol must be one of 'x', 'y', 'omega'; got 'spin'"),
+        ({"omega": -1.0}, "tol of 'omega' must be a positive finite number; got -1.0"),
+        ({}, "tol must name at least one of 'x', 'y', 'omega'; got {}"),
+        (1e-300, "tol must be at least 1e-12, as positions are rounded; got 1e-300"),
+        ({"omega": 1e-13}, "tol of 'omega' must be at least 1e-12"),
+        ("small", "tol must be a positive finite number; got 'small'"),
+    ],
+)
+def test_tolerances_that_are_none(tol, message):
+    with pytest.raises(ValueError, match=message):
+        checks.tolerances(tol, ("x", "y", "omega"), ("x", "y"), 1e-12)
 
 
 def test_what_cannot_be_reached_is_said():
