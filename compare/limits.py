@@ -55,7 +55,7 @@ def _ends(field: Solution) -> NDArray:
 def distances(against: str, family: list[tuple[float, float, float]], other: Solution, tol: float) -> Distances:
     """Solve steered rods (A, G, J) of a family and measure how far they end from another field."""
     end = _ends(other)
-    found = [np.abs(_ends(solve(steered_rod(a, g, j), tol, progress=False)) - end).max(axis=1) for a, g, j in family]
+    found = [np.abs(_ends(solve(steered_rod(a, g, j), tol, frames=1, progress=False)) - end).max(axis=1) for a, g, j in family]
     a, g, j = np.array(family).T
     return Distances(against, a, g, j, np.array(found))
 
@@ -65,7 +65,7 @@ def towards_unit_law(shear: tuple[float, ...] = FAMILY, tol: float = 1e-4) -> Di
 
     The limit is the unit law with true curvature; the distance falls like 1/G.
     """
-    limit = solve(untwisting_rod("unit", curvature="true"), tol, progress=False)
+    limit = solve(untwisting_rod("unit", curvature="true"), tol, frames=1, progress=False)
     return distances("unit law, true curvature", [(0.0, g, 1 / g) for g in shear], limit, tol)
 
 
@@ -73,7 +73,7 @@ def from_the_paper(tol: float = 1e-3) -> list[Distances]:
     """How far rods with A = G ends from the paper's two laws: they are different models, and do not tend to them."""
     family = [(0.0, 160.0, 1 / 160), (1.0, 10.0, 0.05), (10.0, 10.0, 0.25), (100.0, 100.0, 0.05)]
     laws = [("field law, the paper's", "field"), ("unit law, the paper's", "unit")]
-    return [distances(name, family, solve(untwisting_rod(law), tol, progress=False), tol) for name, law in laws]
+    return [distances(name, family, solve(untwisting_rod(law), tol, frames=1, progress=False), tol) for name, law in laws]
 
 
 def locking(stiffness: tuple[float, ...] = LOCKING, n: int = 33) -> NDArray:

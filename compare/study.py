@@ -99,7 +99,7 @@ def convergence(
     """
     sizes, problems = checked_sizes(scene, n, ends)
     if field is None:
-        field = solve(scene, tol, progress=progress)
+        field = solve(scene, tol, frames=2, progress=progress)
     if field.error_estimate is None or not np.isclose(field.t[-1], scene.duration, rtol=1e-12):
         raise ValueError(
             f"field must be solve(scene, tol) of this scene up to t = {scene.duration:g}, with an error estimate; got {field!r}"

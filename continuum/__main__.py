@@ -29,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
     )
     field.add_argument("--n", metavar="N", type=int, help="points of leapfrog (default: 32)")
     field.add_argument("--dt", metavar="DT", type=float, help="step of leapfrog, time (default: k^2/8)")
-    field.add_argument("--frames", metavar="F", type=int, default=2, help="frames, equally spaced over the time (default: 2)")
+    field.add_argument("--frames", metavar="F", type=int, default=101, help="frames, equally spaced over the time (default: 101)")
     command_line.add_saving(field)
     field.set_defaults(run=run_solve)
     discs = commands.add_parser(

@@ -46,7 +46,7 @@ def animate(
     path : where to; .mp4 (H.264, by the ffmpeg that imageio-ffmpeg brings) or .gif (by Pillow).
     fps : pictures a second.
     progress : show a progress bar on anything that takes over a second.
-    radius : to draw the discs with, length. None draws a eighteenth of the rod, and the movie says so: the spokes turn by the true
+    radius : to draw the discs with, length. None draws an eighteenth of the rod, and the movie says so: the spokes turn by the true
         theta, so a disc drawn smaller than it is seems to slide.
     discs : about so many are drawn, with their tracks, all of fewer than twice as many; the rod is drawn whole.
     azimuth, elevation : where it is seen from, degrees.

@@ -58,7 +58,7 @@ def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int 
     ----------
     instants : number of times.
     discs : about so many are drawn, all of fewer than twice as many.
-    radius : half the length of a bar; None draws a eighteenth of the rod.
+    radius : half the length of a bar; None draws an eighteenth of the rod.
     """
     ax = given_or_new(ax, 6.4, 4.8)
     frames = poses.instants(run, checks.whole("instants", instants, 1))

@@ -4,6 +4,10 @@ The ground's force lambda on a disc lies in the plane. By Coulomb's law it holds
 the disc down. The model knows no gravity, so N is asked for. Discs stand upright by assumption: no load goes over from one to
 the next.
 
+At a free end the coefficient depends on the number n of discs: in the limit the ground carries a point force there, and with slaved
+headings a couple too. The end disc's coefficient grows like n**2 (own headings: like n), so it answers for this chain and not for
+the rod. Away from free ends it converges; docs/mechanics.md has figures.
+
 lambda does no work: on the actual motion lambda.r. is what -e.lambda theta. takes.
 """
 
@@ -33,7 +37,10 @@ class Slip:
 
 
 def friction_needed(run: Solution, weight: ArrayLike) -> NDArray:
-    """The friction coefficient |lambda|/N that each disc needs at each frame, (F, N).
+    """The friction coefficient |lambda|/N that each disc needs at each frame, (F, n).
+
+    Near free ends it grows with the number of discs, without a limit (see above): for what a rod needs take discs away from
+    the ends.
 
     Parameters
     ----------
@@ -54,6 +61,7 @@ def friction_needed(run: Solution, weight: ArrayLike) -> NDArray:
 def first_slip(run: Solution, weight: ArrayLike, mu: ArrayLike) -> Slip | None:
     """The first disc that would slip on ground of friction coefficient mu, or None.
 
+    On chains with free ends it is mostly an end disc, and the more discs a chain has the earlier: see `friction_needed`.
     What happens between two frames is seen only as far as frames show it: take as many as the motion needs.
 
     Parameters

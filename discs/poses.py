@@ -57,7 +57,7 @@ def instants(run: Solution, count: int) -> NDArray:
 
 
 def drawn_radius(run: Solution, radius: float | None) -> float:
-    """The radius to draw discs with: as given, or a eighteenth of the rod, so that discs as large as the rod hide nothing."""
+    """The radius to draw discs with: as given, or an eighteenth of the rod, so that discs as large as the rod hide nothing."""
     if radius is None:
         return float(np.ptp(run.s)) / 18
     return checks.number("radius", radius, positive=True)

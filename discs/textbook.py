@@ -84,7 +84,7 @@ def rolling_disc(
         (alpha + m R^2) theta.. = -m R slope sin phi:   theta. = b + c cos phi,   c = m R slope/((alpha + m R^2) Omega).
 
     The contact moves with speed R theta. along phi + pi/2: on a plane on a circle of radius R omega/Omega; on an incline in
-    cycloids that drift sideways, R c/2 on average, and never down. The ground's force is lambda = m R (theta.. (-sin phi, cos
+    cycloids whose mean drift is sideways, R c/2, and not down: what goes down comes up again. The ground's force is lambda = m R (theta.. (-sin phi, cos
     phi) - Omega theta. (cos phi, sin phi)) - (m slope, 0).
 
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.4. `turn_rate` must not be 0.
@@ -135,7 +135,7 @@ def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_
 
         x = slope/(2 Omega^2) sin^2 Omega t,   y = slope/(2 Omega^2) (Omega t - sin(2 Omega t)/2):
 
-    a cycloid; the blade does not go down either.
+    a cycloid: the blade comes back to its height after every half turn.
 
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.6. `turn_rate` must not be 0.
     """

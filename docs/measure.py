@@ -35,7 +35,7 @@ def main() -> None:
     t = [b + (b - a) / 3 for a, b in pairwise(u)]
     print("changes of the extrapolated fields\n", np.array([np.abs(b - a).max(axis=1) for a, b in pairwise(t)]))
 
-    field = solve(untwisting_rod(), 1e-5, progress=False)
+    field = solve(untwisting_rod(), 1e-5, frames=1, progress=False)
     a, b, c = chains("springs", (513, 1025, 2049))
     once = 2 * b - a, 2 * c - b
     truth = last(field, 512)
