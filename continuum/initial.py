@@ -1,0 +1,234 @@
+r"""Initial fields, resolved before anything is computed from them: `resolve(scene)`.
+
+A solver that reads the initial fields at n places of its own takes a bump between two of them for a rod at rest. So the length is
+first cut into pieces on which every field is smooth, by bisection (Chebfun's splitting; Pachon, Platte and Trefethen, 2010). On a
+piece of width h a field f is read at 16 Gauss nodes and expanded in Legendre polynomials,
+
+    f(s) = sum_{k < 16} c_k P_k(x),    x = 2 (s - middle)/h,
+
+and the piece is kept if for every field the last three |c_k|, the misfit at eight other places of the piece, and the misfit at
+those of 8192 probes that lie in it are below 1e-12 of the field's size (the largest deviation from its mean, for x and y from the
+chord) or below rounding. The probes stand one in each 8192th of the length, at irregular places, so gaps between them are at
+most 1/4096: whatever is wider than length/4000 is found wherever it is, and a Gaussian of width length/40000.
+
+Bisection closes in on a corner or a jump. Pieces narrower than 1e-9 of the length are replaced by one edge there, and the rest is
+cut again; on both sides of the edge the fields then are smooth, and the jumps f(s+) - f(s-), f'(s+) - f'(s-) are known. Refused are
+
+* a jump of any field: the energy of a jump of theta is infinite, and no smooth functions approach a jump of omega evenly;
+* a corner of the line where it has bending stiffness: int K |r''|^2/2 is infinite (own headings bend by phi', and only phi must be
+  continuous);
+* an infinite slope, as of sqrt(s), and noise; a line that stands still, r' = 0, where it needs a heading.
+
+A corner of theta, omega or phi has finite energy and is kept.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from continuum.pieces import ENDS, NODES, POINTS, TINY, WEIGHTS, Cut, Data, split
+from continuum.rod import Scene, SteeredRod
+
+SHARP = 1e-6  # pieces shorter than this, of the length, may not hold more than a thousandth of the energy
+STILL = 1e-6  # slopes below this, of the largest, are none
+NARROW = 20.0  # features are what varies over less than this part of the length
+
+
+@dataclass(frozen=True, eq=False)
+class Resolved:
+    """A scene's initial fields on pieces where they are smooth.
+
+    Attributes
+    ----------
+    scene : the scene.
+    pieces : (P + 1,), edges of the pieces, from 0 to the length; corners are among them.
+    energy : kinetic and potential energy by Gauss quadrature, relative error about 1e-12.
+    features : (place, width) of all that is narrower than length/20: the middle of a stretch where some field f of size F has
+        g = max(|f'|, sqrt(F |f''|/2))/F above 20/length, and 1/max g there, about w for exp(-(s/w)^2) and tanh(s/w).
+    kinks : places where the slope of a field jumps, to 1e-10 of the length.
+    """
+
+    scene: Scene
+    pieces: NDArray
+    energy: float
+    features: tuple[tuple[float, float], ...] = ()
+    kinks: tuple[float, ...] = ()
+
+    def fields(self, s: NDArray) -> dict[str, NDArray]:
+        """The initial fields at places (n,) by name, each (n,)."""
+        return self.scene.fields(s)
+
+    def quadrature(self, order: int) -> tuple[NDArray, NDArray]:
+        """Places and weights of Gauss's rule with `order` points on every piece, each (P order,)."""
+        x, w = legendre.leggauss(order)
+        half = np.diff(self.pieces)[:, None] / 2
+        return (self.pieces[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+
+
+def resolve(scene: Scene) -> Resolved:
+    """Cut the length of a scene into pieces on which its initial fields are smooth; kept with the scene.
+
+    Raises
+    ------
+    ValueError : for fields that no pieces resolve, and for a closed scene whose ends do not meet; says where and what would do.
+    """
+    if "_resolved" not in scene.__dict__:
+        object.__setattr__(scene, "_resolved", _resolve(scene))
+    found: Resolved = scene.__dict__["_resolved"]
+    return found
+
+
+def _resolve(scene: Scene) -> Resolved:
+    data = Data(scene)
+    cut = split(data, np.array([0.0, scene.rod.length]))
+    if breaks := cut.breaks():
+        cut = split(data, np.array([0.0, *breaks, scene.rod.length]))
+    if cut.lost.any():
+        p = int(np.argmax(cut.lost))
+        data.refuse(cut.worst[p], f"has no finite slope at s = {cut.edges[p]:g}", "take data with finite slopes there")
+    with np.errstate(all="ignore"):
+        energies, fewer = _energies(data, cut), _energies(data, replace(cut, c=cut.c[..., : 3 * POINTS // 4]))
+    unsettled = np.abs(energies - fewer) + np.where(cut.width < SHARP * scene.rod.length, energies, 0.0)
+    rounding = 1e-16 * (scene.rod.torsion_stiffness + scene.rod.bending_stiffness) / scene.rod.length
+    if not unsettled.sum() <= 1e-3 * energies.sum() + rounding:  # nan too
+        place = cut.edges[np.argmax(np.nan_to_num(unsettled, nan=np.inf))]
+        raise ValueError(
+            f"the energy of the initial fields does not settle near s = {place:g}: it is infinite, or they vary over less than a "
+            f"millionth of the length there; take data that vary over length/500 = {scene.rod.length / 500:g} or more"
+        )
+    _check_jumps(data, cut)
+    return Resolved(scene, cut.edges, float(energies.sum()), _features(data, cut), _kinks(data, cut))
+
+
+def _seam(data: Data) -> NDArray:
+    """What the fields of a closed scene gain around it, (F,)."""
+    gains = {"x": data.scene.shift[0], "y": data.scene.shift[1], "phi": 2 * np.pi * data.scene.turns}
+    return np.array([gains.get(name, 0.0) for name in data.names])
+
+
+def _check_jumps(data: Data, cut: Cut) -> None:
+    """Refuse jumps of fields and corners of the line, between pieces, at the seam of a closed scene and at a free end."""
+    scene, ends = data.scene, cut.at(ENDS)
+    limit = 1e3 * np.maximum(data.allowed, cut.misfit)
+    first, last = ends[:, 0, 0], ends[:, -1, 1]
+    jumps = ends[:, 1:, 0] - ends[:, :-1, 1]
+    misplaced = TINY * data.length * np.abs(cut.at(ENDS, 1)).max(axis=2)  # of corners, times the slopes
+    _check_jump(data, jumps, limit[:, None] + np.maximum(misplaced[:, 1:], misplaced[:, :-1]), cut.edges[1:-1])
+    if scene.closed:
+        gap = last + data.chord * data.length - first - _seam(data)
+        if (np.abs(gap) > limit).any():
+            row = int(np.argmax(np.abs(gap) / limit))
+            gain, end = _seam(data)[row], last[row] + data.chord[row] * data.length
+            what = f"the value at s = 0 plus {gain:g}" if gain else "the value at s = 0"
+            by = {"x": " (or another shift)", "y": " (or another shift)", "phi": " (or other turns)"}.get(data.names[row], "")
+            data.refuse(
+                row,
+                f"must be periodic on a closed scene: at s = length it is {end:.10g}, and {what} is {first[row] + gain:.10g}",
+                f"take data that meet at the seam{by}",
+            )
+    else:
+        own = data.read(np.array([0.0, data.length]))
+        jumps = np.stack([first - own[:, 0], own[:, 1] - last], axis=1)
+        _check_jump(data, jumps, limit[:, None], np.array([0.0, data.length]))
+    if not scene.steered:
+        if scene.rod.bending_stiffness:
+            _check_corners(data, cut)
+        if scene.rolling == "unit" or scene.rod.curvature == "true":
+            _check_heading(data, cut)
+
+
+def _check_jump(data: Data, jumps: NDArray, limit: NDArray, places: NDArray) -> None:
+    """Refuse jumps (F, places) beyond the limit."""
+    beyond = np.abs(jumps) > limit
+    if not beyond.any():
+        return
+    row, p = np.unravel_index(int(np.argmax(np.where(beyond, np.abs(jumps) / data.unit[:, None], 0.0))), jumps.shape)
+    s, width = places[p], data.length / 100
+    data.refuse(
+        int(row),
+        f"jumps by {jumps[row, p]:.4g} at s = {s:.10g}: a field of a rod is continuous, and no functions resolve a jump",
+        f"spread it over a width of {width:g} or more, as by tanh((s - {s:.6g})/{width:g})",
+    )
+
+
+def _turns(data: Data, cut: Cut) -> tuple[NDArray, NDArray, NDArray]:
+    """Jumps of slopes (F, places) that are more than errors (0 where not), at the places, and the largest slopes (F,)."""
+    slope, width = cut.at(ENDS, 1) + data.chord[:, None, None], cut.width
+    jumps, near, places = slope[:, 1:, 0] - slope[:, :-1, 1], np.minimum(width[1:], width[:-1]), cut.edges[1:-1]
+    if data.scene.closed:
+        jumps = np.concatenate([jumps, slope[:, :1, 0] - slope[:, -1:, 1]], axis=1)
+        near, places = np.append(near, min(width[0], width[-1])), np.append(places, cut.edges[-1])
+    real = np.abs(jumps) * near > 1e4 * np.maximum(data.allowed, cut.misfit)[:, None]
+    return np.where(real, jumps, 0.0), places, np.abs(slope).max(axis=(1, 2))
+
+
+def _check_corners(data: Data, cut: Cut) -> None:
+    """Refuse a line with a corner."""
+    jumps, places, largest = _turns(data, cut)
+    turn = np.hypot(*jumps[:2]) / max(float(np.hypot(*largest[:2])), 1e-300)
+    if not (turn > 1e-6).any():
+        return
+    p = int(np.argmax(turn))
+    where = f"s = {places[p]:.10g}" + (" (the seam)" if places[p] == data.length else "")
+    data.refuse(
+        int(np.argmax(np.abs(jumps[:2, p]))),
+        f"has a corner at {where}: r' jumps by ({jumps[0, p]:.4g}, {jumps[1, p]:.4g}), and bending energy K |r''|^2/2 is infinite",
+        f"round it over a width of {data.length / 100:g} or more, or take bending_stiffness = 0",
+    )
+
+
+def _check_heading(data: Data, cut: Cut) -> None:
+    """Refuse a line that stands still somewhere, r' = 0; between two nodes r' is taken for straight."""
+    slope = cut.at(np.concatenate([ENDS[:1], NODES, ENDS[1:]]), 1)[:2] + data.chord[:2, None, None]
+    z = slope[0] + 1j * slope[1]
+    now, move = z[:, :-1], np.diff(z)
+    part = np.clip(-(now.conj() * move).real / np.maximum(np.abs(move) ** 2, 1e-300), 0.0, 1.0)
+    least = np.abs(now + part * move).min(axis=1)
+    p = int(np.argmin(least))
+    if least[p] <= STILL * np.abs(z).max():
+        law = "rolling='unit'" if data.scene.rolling == "unit" else "curvature='true'"
+        raise ValueError(
+            f"{law} needs a heading: r' = 0 between s = {cut.edges[p]:g} and {cut.edges[p + 1]:g}; take a line that moves on with s"
+        )
+
+
+def _kinks(data: Data, cut: Cut) -> tuple[float, ...]:
+    jumps, places, _ = _turns(data, cut)
+    return tuple(places[(jumps != 0).any(axis=0)].tolist())
+
+
+def _energies(data: Data, cut: Cut) -> NDArray:
+    """Energy of every piece, (P,); `Rod` has the densities."""
+    scene, rod = data.scene, data.scene.rod
+    value, slope, bend = (dict(zip(data.names, cut.at(NODES, d), strict=True)) for d in range(3))
+    z = slope["x"] + data.chord[0] + 1j * (slope["y"] + data.chord[1])
+    z1 = bend["x"] + 1j * bend["y"]
+    if isinstance(rod, SteeredRod):
+        strain = z * np.exp(-1j * value["phi"]) - 1
+        density = rod.inertia * value["omega"] ** 2 + rod.heading_inertia * value["phi_rate"] ** 2
+        density += rod.stretch_stiffness * strain.real**2 + rod.shear_stiffness * strain.imag**2
+        density += rod.bending_stiffness * slope["phi"] ** 2
+    else:
+        stretched = 1.0 if scene.rolling == "unit" else np.abs(z) ** 2
+        density = (rod.spin_inertia + rod.density * rod.radius**2 * stretched) * value["omega"] ** 2
+        if rod.curvature == "linear":
+            density += rod.bending_stiffness * np.abs(z1) ** 2
+        else:
+            turning = (z.conj() * z1).imag / np.abs(z) ** 2 if rod.bending_stiffness else 0.0
+            density += rod.bending_stiffness * turning**2 + rod.stretch_stiffness * (np.abs(z) - 1) ** 2
+    density += rod.torsion_stiffness * slope["theta"] ** 2
+    energies: NDArray = cut.width / 4 * (density @ WEIGHTS)
+    return energies
+
+
+def _features(data: Data, cut: Cut) -> tuple[tuple[float, float], ...]:
+    size = np.abs(cut.at(NODES) - data.known.mean(axis=1)[:, None, None]).max(axis=(1, 2))
+    size = np.where(size > 1e3 * data.rounding, size, np.inf)[:, None, None]
+    first, second = cut.at(NODES, 1), cut.at(NODES, 2)
+    rate = np.maximum(np.abs(first) / size, np.sqrt(np.abs(second) / size / 2)).max(axis=0).ravel()
+    s = (cut.edges[:-1, None] + cut.width[:, None] / 2 * (1 + NODES)).ravel()
+    narrow = np.flatnonzero(rate > NARROW / data.length)
+    runs = np.split(narrow, np.flatnonzero(np.diff(s[narrow]) > data.length / NARROW) + 1) if narrow.size else []
+    return tuple((float(s[run[0]] + s[run[-1]]) / 2, float(1 / rate[run].max())) for run in runs)

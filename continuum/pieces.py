@@ -1,0 +1,153 @@
+"""Fields on pieces of the length where they are smooth: bisection and Legendre polynomials; see `continuum.initial`."""
+
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from continuum.rod import Scene
+
+POINTS = 16  # Gauss nodes of a piece
+PROBES = 8192
+SMALL = 1e-12  # misfit that is allowed, relative to the field's size
+NOISE = 1e-9  # misfit, relative, that is taken for rounding of the scene's own if both halves of a piece have it too
+TINY = 1e-9  # pieces shorter than this, of the length, hold a corner or a jump
+SHORTEST = 2.0**-43  # of the length: places are rounded
+MOST = 4096  # pieces that are bisected at once
+EPS = np.finfo(float).eps
+
+NODES, WEIGHTS = legendre.leggauss(POINTS)
+_OTHERS = 2 * np.modf(0.5 + np.arange(1, 9) * (5**0.5 - 1) / 2)[0] - 1
+_BOTH = np.concatenate([NODES, _OTHERS])
+_EXPAND = (legendre.legvander(NODES, POINTS - 1) * WEIGHTS[:, None]).T * (np.arange(POINTS) + 0.5)[:, None]
+_AT_OTHERS = legendre.legvander(_OTHERS, POINTS - 1)
+ENDS = np.array([-1.0, 1.0])
+
+
+class Data:
+    """A scene's initial fields as rows (F, ...), x and y less their chord, with the size of each and the misfit that is allowed."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.length = scene, scene.rod.length
+        cells = np.arange(PROBES)
+        self.probes = self.length * (cells + np.modf(0.5 + cells * (5**0.5 - 1) / 2)[0]) / PROBES
+        fields = scene.fields(self.probes)
+        self.names = tuple(fields)
+        raw = np.stack(list(fields.values()))
+        self.chord = np.zeros(len(raw))
+        self.chord[:2] = (raw[:2, -1] - raw[:2, 0]) / (self.probes[-1] - self.probes[0])
+        self.known = raw - np.outer(self.chord, self.probes)
+        self.size = np.abs(self.known - self.known.mean(axis=1, keepdims=True)).max(axis=1)
+        units = {"x": self.length, "y": self.length, "omega": 1 / scene.duration, "phi_rate": 1 / scene.duration}
+        self.unit = np.array([units.get(name, 1.0) for name in self.names])
+        self.rounding = 64 * EPS * np.maximum(np.abs(raw).max(axis=1), self.unit)
+        self.allowed = SMALL * self.size + self.rounding
+
+    def read(self, s: NDArray) -> NDArray:
+        """The fields at places (n,), x and y less the chord, (F, n)."""
+        return np.stack(list(self.scene.fields(s).values())) - np.outer(self.chord, s)
+
+    def refuse(self, row: int, what: str, cure: str) -> NoReturn:
+        """Raise ValueError about a field, and say so if its values depend on what other places are asked for."""
+        apart = np.abs(self.read(self.probes[::2]) - self.known[:, ::2]).max(axis=1)
+        if (apart > 1e3 * self.allowed).any():
+            name = self.names[int(np.argmax(apart))]
+            raise ValueError(
+                f"initial {name} must be a function of the place: its values change with what other places are asked for; "
+                "tabulate it once and interpolate"
+            )
+        raise ValueError(f"initial {self.names[row]} {what}; {cure}")
+
+
+@dataclass(eq=False)
+class Cut:
+    """Pieces: edges (P + 1,) and coefficients (F, P, 16).
+
+    Further the largest misfit of each field (F,); whether pieces are lost, not resolved at the shortest width, and by which field,
+    each (P,).
+    """
+
+    edges: NDArray
+    c: NDArray
+    misfit: NDArray
+    lost: NDArray
+    worst: NDArray
+
+    @property
+    def width(self) -> NDArray:
+        return np.diff(self.edges)
+
+    def breaks(self) -> list[float]:
+        """Places of corners and jumps: in each run of tiny pieces the middle of the shortest."""
+        width = self.width
+        tiny = np.flatnonzero(width < TINY * self.edges[-1])
+        runs = np.split(tiny, np.flatnonzero(np.diff(tiny) > 1) + 1) if tiny.size else []
+        middles = [self.edges[p] + width[p] / 2 for p in (run[np.argmin(width[run])] for run in runs)]
+        least = TINY * self.edges[-1]
+        return [float(s) for s in middles if least < s < self.edges[-1] - least]
+
+    def at(self, x: NDArray, derivative: int = 0) -> NDArray:
+        """Fields, or derivatives by s, at places x (n,) of every piece, within [-1, 1]: (F, P, n)."""
+        polynomials = legendre.legder(np.eye(self.c.shape[-1]), derivative) if derivative else np.eye(self.c.shape[-1])
+        values = legendre.legvander(x, len(polynomials) - 1) @ polynomials
+        return self.c @ values.T * (2 / self.width[:, None]) ** derivative
+
+
+def split(data: Data, edges: NDArray) -> Cut:
+    """Bisect pieces until they are resolved, or too short to be cut."""
+    kept: list[tuple[NDArray, ...]] = []
+    lo, hi = edges[:-1], edges[1:]
+    before = np.full((len(data.size), lo.size), np.inf)  # misfit of the piece that was cut
+    while lo.size:
+        half = (hi - lo) / 2
+        values = data.read((lo[:, None] + half[:, None] * (1 + _BOTH)).ravel()).reshape(len(data.size), lo.size, -1)
+        nodes = values[..., :POINTS]
+        c = nodes @ _EXPAND.T
+        misfit = np.maximum(np.abs(c[..., -3:]).max(axis=-1), np.abs(c @ _AT_OTHERS.T - values[..., POINTS:]).max(axis=-1))
+        slope = (np.abs(np.diff(nodes)) / np.diff(NODES)).max(axis=-1) / half
+        allowed = data.allowed[:, None] + 8 * EPS * data.length * slope  # the places are rounded
+        good = (misfit <= allowed).all(axis=0)
+        misfit = np.maximum(misfit, _misfit_at_probes(data, lo, hi, c, good))
+        noise = (misfit <= NOISE * data.size[:, None]) & _in_both_halves(misfit > before / 4)
+        ratio = np.where(noise, 0.0, misfit / allowed)
+        lost = (ratio > 1).any(axis=0) & (hi - lo < 2 * SHORTEST * data.length)
+        good = (ratio <= 1).all(axis=0) | lost
+        # what is below rounding is no part of the field: derivatives would enlarge it
+        c = np.where(np.abs(c) <= data.rounding[:, None, None] / 4, 0.0, c)
+        kept.append(
+            (lo[good], hi[good], np.moveaxis(c[:, good], 1, 0), misfit[:, good].T, lost[good], np.argmax(ratio, axis=0)[good])
+        )
+        lo, hi, again = lo[~good], hi[~good], ~good
+        if lo.size > MOST:
+            data.refuse(
+                int(np.argmax(ratio[:, int(np.argmax(again))])),
+                f"is not resolved by {MOST} pieces of {POINTS} points: at s = {lo[0]:g} it varies within {hi[0] - lo[0]:.1g}",
+                f"smooth it over length/100 = {data.length / 100:g} or more",
+            )
+        middle = (lo + hi) / 2
+        lo, hi = np.stack([lo, middle], axis=1).ravel(), np.stack([middle, hi], axis=1).ravel()
+        before = np.repeat(misfit[:, again], 2, axis=1)
+    low, high, coefficients, misfits, lost, worst = (np.concatenate(parts) for parts in zip(*kept, strict=True))
+    order = np.argsort(low)
+    largest = np.where(lost[:, None], 0.0, misfits).max(axis=0)
+    return Cut(np.append(low[order], high.max()), np.moveaxis(coefficients[order], 0, 1), largest, lost[order], worst[order])
+
+
+def _in_both_halves(found: NDArray) -> NDArray:
+    """Where something is found (F, P) in a piece and in its other half, its neighbour in the list; False before any cut."""
+    if found.shape[1] % 2:
+        return np.zeros_like(found)
+    return np.repeat(found[:, ::2] & found[:, 1::2], 2, axis=1)
+
+
+def _misfit_at_probes(data: Data, lo: NDArray, hi: NDArray, c: NDArray, which: NDArray) -> NDArray:
+    """Largest misfit of every field at the probes in those pieces, (F, P); 0 in others and where no probe is."""
+    worst = np.zeros(c.shape[:2])
+    first, last = np.searchsorted(data.probes, lo), np.searchsorted(data.probes, hi)
+    for p in np.flatnonzero(which & (last > first)):
+        x = (2 * data.probes[first[p] : last[p]] - lo[p] - hi[p]) / (hi[p] - lo[p])
+        fit = c[:, p] @ legendre.legvander(x, POINTS - 1).T
+        worst[:, p] = np.abs(fit - data.known[:, first[p] : last[p]]).max(axis=1)
+    return worst
