@@ -9,11 +9,11 @@ from discs.problem import Problem
 
 
 def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float:
-    """A step to begin with: it follows torsion waves if implicit, and is 0.7 of the stability limit if explicit. No error is promised.
+    """A step to begin with: it follows torsion waves if implicit, and is 0.7 of the stability limit if explicit.
 
-    Measured with the midpoint method, N = 17 to 257, relative to the largest value of each coordinate: 1e-5 to 1e-3 on the paper's
-    twist of half a turn (both laws, own headings A = G = 10) and the breathing ring; of order 1 for two turns at N = 65, where a
-    third of the steps do not converge. For a promised error give `simulate` a tol.
+    No error is promised. Measured with the midpoint method, N = 17 to 257, relative to the largest value of each coordinate: 1e-5
+    to 1e-3 on the paper's twist of half a turn (both laws, own headings A = G = 10) and the breathing ring; of order 1 for two
+    turns at N = 65, where a third of the steps do not converge. For a promised error give `simulate` a tol.
 
     Implicit: half the time a torsion wave takes from disc to disc, at most a hundredth of the duration.
     SciPy's methods: a tenth of the duration, the longest step they may take.

@@ -84,8 +84,8 @@ def rolling_disc(
         (alpha + m R^2) theta.. = -m R slope sin phi:   theta. = b + c cos phi,   c = m R slope/((alpha + m R^2) Omega).
 
     The contact moves with speed R theta. along phi + pi/2: on a plane on a circle of radius R omega/Omega; on an incline in
-    cycloids whose mean drift is sideways, R c/2, and not down: what goes down comes up again. The ground's force is lambda = m R (theta.. (-sin phi, cos
-    phi) - Omega theta. (cos phi, sin phi)) - (m slope, 0).
+    cycloids whose mean drift is sideways, R c/2, and not down: what goes down comes up again. The ground's force is lambda =
+    m R (theta.. (-sin phi, cos phi) - Omega theta. (cos phi, sin phi)) - (m slope, 0).
 
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.4. `turn_rate` must not be 0.
     """

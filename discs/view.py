@@ -66,8 +66,8 @@ def view(
     path : where to write it, .html; None writes nothing.
     beside : another run, shown to the right at the same time and from the same place.
     titles : one for each run; None takes the method and the number of discs.
-    radius : to draw the discs with, length. None draws an eighteenth of the rod, which the page says: spokes turn by the true theta,
-        so a disc drawn smaller than it is seems to slide.
+    radius : to draw the discs with, length. None draws an eighteenth of the rod, which the page says: spokes turn by the true
+        theta, so a disc drawn smaller than it is seems to slide.
     discs : about so many of a run are drawn, all of fewer than twice as many, and the rod through them.
 
     The ground's force can be chosen if both runs recorded it, want=("contact_force",).
