@@ -91,7 +91,7 @@ def _settle(rod: Rod, names: tuple[str, ...], positive: bool = False) -> None:
     for name in names:
         value = checks.number(name, getattr(rod, name), positive=positive)
         if value < 0:
-            raise ValueError(f"{name} must be at least 0; got {value!r}")
+            raise ValueError(f"{name} must be at least 0; got {checks.shown(value)}")
         object.__setattr__(rod, name, value)
 
 
@@ -127,13 +127,16 @@ class Scene:
 
     def __post_init__(self) -> None:
         if not isinstance(self.rod, Rod) or not callable(self.initial):
-            raise ValueError(f"a scene needs a Rod and a function of s; got {self.rod!r} and {self.initial!r}")
+            raise ValueError(
+                f"a scene needs a Rod and a function of s; got {checks.shown(self.rod)} and {checks.shown(self.initial)}"
+            )
         if not isinstance(self.closed, bool):
-            raise ValueError(f"closed must be True or False; got {self.closed!r}")
+            raise ValueError(f"closed must be True or False; got {checks.shown(self.closed)}")
         if self.steered:
             checks.choice("rolling (own headings)", self.rolling, ("unit",))
         checks.choice("rolling", self.rolling, ROLLING)
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
+        object.__setattr__(self, "turns", checks.whole("turns", self.turns))
         shift = checks.field("shift", self.shift, 2)
         if shift.any() and not self.closed:
             raise ValueError(f"shift belongs to a closed rod; got shift={self.shift} with closed=False")

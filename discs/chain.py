@@ -96,6 +96,7 @@ class Chain(Spaced):
         checks.choice("rolling", self.rolling, ROLLING)
         checks.choice("curvature", self.curvature, CURVATURE)
         n = checks.whole(f"n (discs, ends={self.ends!r})", self.n, FEWEST[self.ends], WHY[self.ends])
+        object.__setattr__(self, "n", n)
         links = n - (self.ends != "ring")
         _settle(
             self,
@@ -161,6 +162,7 @@ class SteeredChain(Spaced):
         checks.choice("ends (own headings)", self.ends, ("springs", "ring"))
         least, why = (5, "a ring's neighbours must differ") if self.ends == "ring" else (2, "a link joins two discs")
         n = checks.whole(f"n (discs, ends={self.ends!r})", self.n, least, why)
+        object.__setattr__(self, "n", n)
         links = n - (self.ends != "ring")
         _settle(
             self,
@@ -173,8 +175,7 @@ class SteeredChain(Spaced):
             bending_stiffness=(links, False),
             radius=(n, False),
         )
-        if isinstance(self.turns, bool) or not isinstance(self.turns, int):
-            raise ValueError(f"turns must be a whole number; got {self.turns!r}")
+        object.__setattr__(self, "turns", checks.whole("turns", self.turns))
         if self.ends != "ring" and self.turns:
             raise ValueError(f"turns of the heading are counted around a ring; with ends={self.ends!r} it must be 0")
 

@@ -1,37 +1,82 @@
-"""Refusing bad input: what is required, what was given, what to do."""
+"""Refusing bad input: what is required, what was given, what to do.
+
+Numbers are finite and real: ints, floats, fractions, decimals, NumPy's, and arrays of them. What merely can be turned into a number
+is none: truth values, texts, dates and times, complex numbers, even with an imaginary part of 0, and arrays with masked entries.
+"""
 
 import math
+import operator
+import reprlib
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+MOST = 2**53  # the largest count; above it not every whole number is a double
+TEXTS = (str, bytes, bytearray, memoryview)
+
+
+class _Short(reprlib.Repr):
+    """What was given, in few words however large it is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlist = self.maxtuple = self.maxarray = self.maxdict = self.maxset = 6
+        self.maxstring = self.maxother = self.maxlong = 60
+        self.maxlevel = 3
+
+    def repr_int(self, x: int, level: int) -> str:
+        size = abs(x).bit_length()
+        return repr(x) if size < 100 else f"a {'negative ' * (x < 0)}whole number of {int(size * 0.30103) + 1} digits"
+
+    def repr_ndarray(self, x: NDArray, level: int) -> str:
+        return super().repr_instance(x, level) if x.size < 4 else f"an array of shape {x.shape} and type {x.dtype}"
+
+    repr_MaskedArray = repr_ndarray
+
+
+_SHORT = _Short()
+
+
+def shown(value: object) -> str:
+    """What was given, in one short line however large it is."""
+    return " ".join(_SHORT.repr(value).split())
 
 
 def choice(name: str, value: object, known: Iterable[str]) -> str:
     """Return `value` if it is one of the `known` names, else raise ValueError listing them."""
     known = tuple(known)
     if not isinstance(value, str) or value not in known:
-        raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}; got {value!r}")
-    return value
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}; got {shown(value)}")
+    return str(value)
 
 
-def whole(name: str, value: object, least: int, why: str = "") -> int:
-    """Return `value` as an int not below `least`, else raise ValueError."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        reason = f" ({why})" if why else ""
-        raise ValueError(f"{name} must be a whole number of at least {least}{reason}; got {value!r}")
-    return int(value)
+def whole(name: str, value: object, least: int | None = None, why: str = "") -> int:
+    """Return `value` as an int, not below `least` and not beyond 2**53, else raise ValueError."""
+    given = value if type(value) is int else _index(value)
+    if given is None or (least is not None and given < least):
+        need = "" if least is None else f" of at least {least}"
+        raise ValueError(f"{name} must be a whole number{need}{f' ({why})' * bool(why)}; got {shown(value)}")
+    if abs(given) > MOST:
+        raise ValueError(f"{name} must be at most 2**53 in size, more than a computer can hold or count; got {shown(value)}")
+    return int(given)
 
 
 def number(name: str, value: object, *, positive: bool = False) -> float:
     """Return `value` as a finite float, positive if asked for, else raise ValueError."""
-    need = "a positive finite number" if positive else "a finite number"
-    try:
-        given = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be {need}; got {value!r}") from None
-    if isinstance(value, (bool, str)) or not math.isfinite(given) or (positive and given <= 0):
-        raise ValueError(f"{name} must be {need}; got {value!r}")
+    given = value if type(value) is float else np.nan if np.ndim(value) else _doubles(value)  # type: ignore[arg-type]
+    if isinstance(given, str) or not math.isfinite(given) or (positive and given <= 0):
+        why = f" ({given})" if isinstance(given, str) and given else ""
+        raise ValueError(f"{name} must be a {'positive ' * positive}finite number; got {shown(value)}{why}")
+    return float(given)
+
+
+def array(name: str, value: ArrayLike, need: str = "finite numbers") -> NDArray:
+    """Return `value` as a new float array, entries may be infinite or NaN; else raise ValueError that names what is needed."""
+    given = _doubles(value)
+    if isinstance(given, str):
+        raise ValueError(f"{name} must be {need}; got {shown(value)}{f' ({given})' * bool(given)}")
     return given
 
 
@@ -40,10 +85,7 @@ def field(name: str, value: ArrayLike, size: int, *, least: float | None = None,
 
     With `least`, every entry must be at least that, or larger if `strict`.
     """
-    try:
-        given = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a number or {size} numbers; got {value!r}") from None
+    given = array(name, value, f"a number or {size} numbers")
     if given.shape not in ((), (size,)):
         raise ValueError(f"{name} must be a number or an array of shape ({size},); got shape {given.shape}")
     given = np.broadcast_to(given, (size,))
@@ -60,7 +102,7 @@ def field(name: str, value: ArrayLike, size: int, *, least: float | None = None,
 
 def vector(name: str, value: ArrayLike, size: int) -> NDArray:
     """Return `value` as a finite float array (size,), else raise ValueError."""
-    given = np.asarray(value, dtype=float)
+    given = array(name, value, f"{size} finite numbers")
     if given.shape != (size,) or not np.isfinite(given).all():
         raise ValueError(
             f"{name} must be {size} finite numbers; got shape {given.shape}, {np.isfinite(given).sum()} of them finite"
@@ -72,7 +114,7 @@ def iteration(sweeps: object, tolerance: object) -> None:
     """Check the limits of an iteration: at least one sweep, a tolerance that is not negative."""
     whole("sweeps", sweeps, 1)
     if number("tolerance", tolerance) < 0:
-        raise ValueError(f"tolerance must be at least 0; got {tolerance!r}")
+        raise ValueError(f"tolerance must be at least 0; got {shown(tolerance)}")
 
 
 def tolerances(tol: object, known: Iterable[str], usual: Iterable[str], least: float) -> dict[str, float]:
@@ -84,7 +126,7 @@ def tolerances(tol: object, known: Iterable[str], usual: Iterable[str], least: f
     known = tuple(known)
     if isinstance(tol, Mapping):
         if not tol:
-            raise ValueError(f"tol must name at least one of {', '.join(map(repr, known))}; got {tol!r}")
+            raise ValueError(f"tol must name at least one of {', '.join(map(repr, known))}; got {shown(tol)}")
         bound = {choice("tol", name, known): number(f"tol of {name!r}", value, positive=True) for name, value in tol.items()}
     else:
         bound = dict.fromkeys(usual, number("tol", tol, positive=True))
@@ -93,3 +135,58 @@ def tolerances(tol: object, known: Iterable[str], usual: Iterable[str], least: f
             of = f" of {name!r}" if isinstance(tol, Mapping) else ""
             raise ValueError(f"tol{of} must be at least {least:g}, as positions are rounded; got {value:g}")
     return bound
+
+
+def _index(value: Any) -> int | None:
+    """A whole number as an int; None if it is something else."""
+    try:
+        return None if isinstance(value, bool) or np.ma.is_masked(value) else operator.index(value)
+    except TypeError:
+        return None
+
+
+def _doubles(value: ArrayLike) -> NDArray | str:
+    """A new float array of what is given, or why it is none, as far as that can be said."""
+    if isinstance(value, TEXTS):
+        return ""
+    try:
+        if _masked(value):
+            return "with masked entries: fill or leave them out"
+        # entries of lists are looked at one by one: NumPy would take a truth value among numbers for a number
+        given = np.asarray(value) if hasattr(value, "dtype") or hasattr(value, "__array__") else np.array(value, dtype=object)
+    except (TypeError, ValueError):
+        return ""
+    kind = given.dtype.kind
+    if kind == "O":
+        if (why := next((why for entry in given.flat if (why := _odd(entry)) is not None), None)) is not None:
+            return why
+    elif kind not in "iuf":
+        return KINDS.get(kind, "")
+    try:
+        with np.errstate(over="ignore"):
+            return np.array(given, dtype=float)
+    except OverflowError:
+        return "too large for a double"
+    except (TypeError, ValueError):
+        return ""
+
+
+KINDS = {"b": "truth values", "c": "complex numbers", "M": "dates", "m": "times", "U": "text", "S": "text"}
+
+
+def _masked(value: Any) -> bool:
+    return bool(np.ma.is_masked(value)) or (isinstance(value, (list, tuple)) and any(map(_masked, value)))
+
+
+def _odd(entry: Any) -> str | None:
+    """Why an entry is no number, "" if that goes without saying; None if it is one."""
+    if isinstance(entry, (float, int)) and not isinstance(entry, bool):
+        return None
+    if hasattr(entry, "dtype"):
+        kind = np.asarray(entry).dtype.kind
+        if kind == "O":  # an array without dimensions
+            return _odd(np.asarray(entry).item())
+        return None if kind in "iuf" else KINDS.get(kind, "")
+    if isinstance(entry, (bool, complex)):
+        return KINDS["b" if isinstance(entry, bool) else "c"]
+    return None if hasattr(entry, "__float__") else ""

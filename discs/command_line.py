@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -162,6 +163,7 @@ def draw(options: argparse.Namespace) -> None:
 def main(parser: argparse.ArgumentParser, arguments: list[str] | None) -> int:
     """Run a command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
     options = parser.parse_args(arguments)
+    formatted, warnings.formatwarning = warnings.formatwarning, lambda message, *_: f"warning: {message}\n"
     try:
         options.run(options)
     except (ValueError, OSError) as error:
@@ -176,4 +178,6 @@ def main(parser: argparse.ArgumentParser, arguments: list[str] | None) -> int:
     except KeyboardInterrupt as stop:
         print(str(stop) or "interrupted; what is on disc is whole", file=sys.stderr)
         return 130
+    finally:
+        warnings.formatwarning = formatted
     return 0

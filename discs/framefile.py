@@ -138,6 +138,10 @@ class FrameFile:
 
     # Frames
 
+    def __contains__(self, name: str) -> bool:
+        """Whether frames record a quantity."""
+        return name in self._places
+
     def write(self, f: int, rows: dict[str, Any]) -> None:
         """Write frame f, its checksum last."""
         data = {name: np.ascontiguousarray(value, NUMBER) for name, value in rows.items()}

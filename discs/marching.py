@@ -2,7 +2,6 @@
 
 import sys
 import threading
-import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +11,7 @@ from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
 from discs.system import Phase, Placed, RollingDiscs
+from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which it is said
 _PREPARED: set[tuple[type, type]] = set()
@@ -40,12 +40,11 @@ def _warn_of_lost_digits(system: RollingDiscs, h: float) -> None:
     A sweep multiplies what is still wrong by the largest entry, h^2 `stiffest`, times the unit of rounding, 1.1e-16: sweeps stop
     converging when that comes near one.
     """
-    lost = 1.1e-16 * h**2 * system.stiffest
+    lost = 1.1e-16 * h * h * system.stiffest
     if lost > 0.1:
-        warnings.warn(
+        warn(
             f"{system.n} discs at dt = {h:g}: each sweep of a step keeps {lost:.1g} of what is wrong, by rounding, and the run "
-            f"may not be trusted; take dt below {h * np.sqrt(0.1 / lost):.1g}, or fewer discs",
-            stacklevel=4,
+            f"may not be trusted; take dt below {h * np.sqrt(0.1 / lost):.1g}, or fewer discs"
         )
 
 
@@ -74,7 +73,7 @@ class March:
         self.chunk = max(1, CHUNK // self.system.n)
         self.bound = problem.blown_up
         if problem.ill_posed:
-            warnings.warn(problem.ill_posed, stacklevel=3)
+            warn(problem.ill_posed)
         if integrator.stability_limit == np.inf and not integrator.adaptive:
             _warn_of_lost_digits(self.system, h)
         self.memory: Any = integrator.begin(self.system, problem.start(), h, self.work, self.kernel)
@@ -146,7 +145,10 @@ class March:
             shape = system.shape(frame.hi, frame.lo)
             q, energy = frame.hi + frame.lo, system.kinetic(frame.rate) + system.potential(shape)
             slip = np.hypot(*(frame.rate[:2] - system.contact(shape) * frame.rate[2])).max()
-        return dict(zip(system.rows, q, strict=True)) | {"omega": frame.rate[2], "energy": energy, "rolling_residual": slip}
+        found = dict(zip(system.rows, q, strict=True)) | {"omega": frame.rate[2]}
+        if "phi" in found:
+            found["phi_rate"] = frame.rate[3]
+        return found | {"energy": energy, "rolling_residual": slip}
 
     def _plain(self) -> int:
         previous, stuck = self.memory, self.work.unconverged

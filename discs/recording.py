@@ -166,6 +166,9 @@ class Recording(Rows):
             if one != other:
                 told = "" if isinstance(one, bytes) or isinstance(other, bytes) else f": {one} there, {other} here"
                 raise ValueError(f"{self.path} holds another run, whose {name} differs{told}; give another path, or delete it")
+        if "phi" in file and "phi_rate" not in file:
+            told = "was begun by an older version, which did not record phi_rate"
+            raise ValueError(f"{self.path} {told}; give another path, or delete it")
 
 
 def read_restart(path: Path) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """The one door to a run: `simulate(problem, method, ...)`."""
 
 import time as clock
-import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,12 @@ from discs.solution import Solution
 from discs.step import suggest_dt
 from discs.system import RollingDiscs
 from discs.tolerance import to_tolerance
+from discs.warn import warn
 
 WANTS = ("velocity", "slope", "contact_force")
 MOST_STEPS = 2.0**53
 ENGINES = ("compiled", "plain")
+ROUNDING = 1e-12  # of the duration: a frame so far outside it is at its end
 LOST = 0.01  # of the energy: a run is warned of
 
 
@@ -85,7 +86,7 @@ def simulate(
     else:
         found = _run(problem, find(method), dt, frames, want, progress, engine, checkpoint)
     if warning := lost_energy(problem, found.stats["method"], found.t, found.energy):
-        warnings.warn(warning, stacklevel=2)
+        warn(warning)
     return found
 
 
@@ -172,7 +173,7 @@ def _extras(system: RollingDiscs, frame: Frame, want: tuple[str, ...]) -> dict[s
     shape, rate = system.shape(frame.hi, frame.lo), frame.rate
     found: dict[str, Any] = {}
     if "velocity" in want:
-        found |= {f"{name}_rate": rate[row] for row, name in enumerate(system.rows) if name != "theta"}
+        found |= {"x_rate": rate[0], "y_rate": rate[1]}
     if "slope" in want:
         found |= dict(zip(("slope_x", "slope_y"), system.slope(shape), strict=True))
     if "contact_force" in want:
@@ -206,7 +207,7 @@ class Progress:
 
 def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:
     if not isinstance(want, Iterable):
-        raise ValueError(f"want must be names of quantities; got {want!r}")
+        raise ValueError(f"want must be names of quantities; got {checks.shown(want)}")
     given = (want,) if isinstance(want, str) else tuple(want)
     return tuple(checks.choice("want", name, (*WANTS, *integrator.offers)) for name in given)
 
@@ -219,15 +220,19 @@ def steps_before(time: float, h: float) -> tuple[int, float]:
 
 
 def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
-    """The times of frames, (F,), from their number or themselves; see `simulate`."""
+    """The times of frames, (F,), from their number or themselves; see `simulate`.
+
+    A time outside the duration by no more than rounding, as `np.arange(0, 0.35, 0.1)` makes of 0.3, is taken at its end.
+    """
     if np.ndim(frames) == 0:
         count = checks.whole("frames", frames, 1, "the last state is always one")
         return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])
-    try:
-        times = np.asarray(frames, dtype=float)
-    except (TypeError, ValueError):
-        times = np.array([np.nan])
-    inside = np.isfinite(times).all() and times.ndim == 1 and times.size and times[0] >= 0 and times[-1] <= duration
-    if not inside or (np.diff(times) <= 0).any():
-        raise ValueError(f"frames must be increasing times within [0, {duration:g}], or their number; got {frames!r}")
+    need = f"increasing times within [0, {duration:g}], or their number"
+    times = checks.array("frames", frames, need)
+    near = np.clip(times, 0.0, duration)
+    times = np.where(np.abs(times - near) <= ROUNDING * duration, near, times)
+    if times.ndim != 1 or not times.size or not np.isfinite(times).all():
+        raise ValueError(f"frames must be {need}; got {checks.shown(frames)}")
+    if times[0] < 0 or times[-1] > duration or (np.diff(times) <= 0).any():
+        raise ValueError(f"frames must be {need}; got {times.min():.17g} to {times.max():.17g}: {checks.shown(frames)}")
     return times

@@ -1,13 +1,15 @@
 """What a run returns."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.problem import Problem
+from discs import checks
+from discs.problem import Problem, State
 
 if TYPE_CHECKING:
     import xarray
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A motion at F frames of N discs (or of a field on N nodes). Time is the first axis, discs are the last.
+
+    `run[10:20]`, `run[::5]`, `run[run.t > 2]` is the same run at fewer frames; `run.state(frame)` starts another one.
 
     Attributes
     ----------
@@ -32,9 +36,8 @@ class Solution:
         rounding. (Methods in (q, pi) form r. from e omega; that their steps roll is |r_{n+1} - r_n - e (theta_{n+1} - theta_n)| = 0
         with e at the midpoint.) None for an extrapolated field.
     stats : what was done: method, order, dt and where it came from, steps, work, seconds.
-    phi : (F, N), own headings, rad; only of discs that have them.
+    phi, phi_rate : (F, N), own headings, rad, and their rates, rad per time; only of discs that have them.
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
-    phi_rate : (F, N), rates of turning, rad per time; want "velocity", own headings.
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
     contact_force : (F, 2, N), force (x, y) of the ground that keeps each disc rolling, the multiplier lambda, mass times length
         per time squared; want "contact_force".
@@ -72,6 +75,55 @@ class Solution:
             f"Solution({frames} frames of {n} discs, t = {self.t[0]:g} to {self.t[-1]:g}, "
             f"method {self.stats.get('method')!r}, energy {self.energy[0]:.6g} to within {drift:.1e})"
         )
+
+    def __getitem__(self, frames: slice | NDArray | Sequence[int]) -> "Solution":
+        """The run at some of its frames, in order of time: a slice, a mask (F,) or numbers of frames."""
+        try:
+            picked = np.arange(self.t.size)[frames]
+        except (IndexError, TypeError, ValueError):
+            picked = np.array(0)
+        if picked.ndim != 1 or not picked.size or (np.diff(picked) <= 0).any():
+            raise ValueError(
+                f"frames of a run are picked by a slice, a mask or numbers of frames, at least one of the {self.t.size} and in "
+                f"order of time; got {checks.shown(frames)}; of one frame take run[i : i + 1], or its state, run.state(i)"
+            )
+        whole = ("s", "stats", "error_estimate", "problem")
+        rows = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in whole}
+        return replace(self, **{name: value[frames] for name, value in rows.items() if value is not None})
+
+    __iter__ = None  # a run is no sequence of frames
+
+    def state(self, frame: int = -1) -> State:
+        """Where the discs are at a frame and how fast they roll and turn, all that the motion goes on from.
+
+        `Problem(run.problem.chain, run.state(), duration)` goes on from the last frame, whatever the chain. (To the same bits goes
+        `simulate(checkpoint=)`: frames do not hold what a method remembers between steps.) Of a field, the state of its nodes.
+
+        Parameters
+        ----------
+        frame : number of the frame, from the end if it is negative.
+
+        Raises
+        ------
+        ValueError : if there is no such frame, for a free rod, whose velocities do not follow from rolling, and for own headings
+            from an old archive that lacks their rates.
+        """
+        frames = self.t.size
+        if not -frames <= (i := checks.whole("frame", frame, -frames)) < frames:
+            raise ValueError(f"frame must be one of the {frames} frames; got {frame}")
+        if self.tension is not None:
+            raise ValueError(
+                "a free rod does not roll, and its state is more than a State: go on by free_rod with r0 = (x, y), "
+                "v0 = (x_rate, y_rate), theta0 = theta and omega0 = omega of a frame"
+            )
+        if self.phi is None:
+            return State(self.x[i], self.y[i], self.theta[i], self.omega[i])
+        if self.phi_rate is None:
+            raise ValueError(
+                "this run lacks phi_rate, the rates of its headings, as archives of an older version do where velocities were not "
+                "asked for: no other run can start from it; compute it again"
+            )
+        return State(self.x[i], self.y[i], self.theta[i], self.omega[i], self.phi[i], self.phi_rate[i])
 
     def plot(self, *panels: str, ax: Any = None) -> "list[Axes]":
         """A first look at the run: all panels, or those named; see `discs.figures.first_look`."""

@@ -47,7 +47,7 @@ class Textbook:
 
 def _nonzero(name: str, value: float, why: str) -> float:
     if checks.number(name, value) == 0:
-        raise ValueError(f"{name} must not be 0 ({why}); got {value!r}")
+        raise ValueError(f"{name} must not be 0 ({why}); got {checks.shown(value)}")
     return float(value)
 
 

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from discs import checks
 from discs.integrators.base import OneStep, Work
 from discs.integrators.midpoint import Midpoint
 from discs.system import Phase, SkewGradient
@@ -34,7 +35,7 @@ class Composition(OneStep, ABC):
 
     def __post_init__(self) -> None:
         if not isinstance(self.base, Midpoint):
-            raise ValueError(f"base must be a Midpoint; got {self.base!r}")
+            raise ValueError(f"base must be a Midpoint; got {checks.shown(self.base)}")
 
     def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
         for fraction in self.fractions:

@@ -1,0 +1,16 @@
+"""Warnings that name the line of the user's program, whichever of our functions found the reason."""
+
+import sys
+import warnings
+
+OURS = ("discs", "continuum", "compare", "importlib")  # importlib: of a module that is imported when it is needed
+
+
+def warn(message: str) -> None:
+    """Warn at the nearest line outside our packages; from the command line, where there is none, at the outermost."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None and (frame.f_globals.get("__package__") or "").partition(".")[0] in OURS:
+        frame = frame.f_back
+    place = frame.f_globals
+    name, registry = place.get("__name__", "<string>"), place.setdefault("__warningregistry__", {})
+    warnings.warn_explicit(message, UserWarning, frame.f_code.co_filename, frame.f_lineno, name, registry)
