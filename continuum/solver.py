@@ -1,5 +1,6 @@
 """Fields to a tolerance, or by the paper's scheme: `solve(scene, ...)`."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -7,15 +8,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from tqdm import tqdm
 
+from continuum.bounds import FIELDS, bounds, missed, over
 from continuum.elements import solve_elements
+from continuum.initial import resolve
 from continuum.mesh import semidiscretise
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
 from continuum.told import tells_scene
-from discs import Midpoint, Solution, Suzuki4, checks, simulate, suggest_dt
+from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.simulation import frame_times
 
-FIELDS = ("x", "y", "theta", "omega")
 COARSEST = 33
 FINEST = 8193
 MOST_STEPS = 25 * 2**12
@@ -24,7 +26,7 @@ MOST_STEPS = 25 * 2**12
 @tells_scene
 def solve(
     scene: Scene,
-    tol: float = 1e-5,
+    tol: float | Mapping[str, float] = 1e-5,
     method: str | None = None,
     n: int | None = None,
     dt: float | None = None,
@@ -52,7 +54,8 @@ def solve(
     Parameters
     ----------
     scene : what to solve.
-    tol : largest error wanted in x, y (length), theta and phi (rad) over nodes and frames; not of "leapfrog".
+    tol : largest error wanted in x, y (length), theta and phi (rad) over nodes and frames; not of "leapfrog". A mapping binds what
+        it names instead, rates too: {"omega": 1e-4, "theta": 1e-5}.
     method : "spectral", "richardson" or "leapfrog"; "elements" for headings of their own. The first that fits by default.
     n, dt : points and step of "leapfrog"; the step is below k^2/8 where that would be unstable.
     frames : number of frames, equally spaced over the duration with both ends, or their times. The spectral field takes a step of
@@ -61,18 +64,23 @@ def solve(
 
     Returns
     -------
-    Solution on the nodes `s`, with `error_estimate` of x, y, theta and omega.
+    Solution on the nodes `s`, with `error_estimate` of x, y, theta, omega, of phi and phi_rate where sections have them, and of the
+    energy: its largest distance from that of the initial fields, by quadrature, which the motion keeps.
 
     Raises
     ------
-    ValueError : for a bad tolerance, method or mesh, and when the tolerance is not reached with the most functions or nodes and
-        steps that the method tries.
+    ValueError : for a bad tolerance, method or mesh; for initial fields that jump, or that nothing resolves (`continuum.initial`);
+        when the tolerance is not reached with the most functions or nodes and steps that the method tries.
     SimulationError : when the motion cannot go on; see `discs.simulate`.
     """
+    if not isinstance(scene, Scene):
+        instead = "; simulate(problem) runs discs" if isinstance(scene, Problem) else ""
+        raise ValueError(f"solve takes a Scene, as untwisting_rod() makes; got {type(scene).__name__}{instead}")
     fitting = ("elements",) if scene.steered else ("richardson", "leapfrog")
     if scene.rod.curvature == "linear" and not scene.steered:
         fitting = ("spectral", *fitting)
     method = fitting[0] if method is None else checks.choice("method", method, fitting)
+    energy = resolve(scene).energy
     if method == "leapfrog":
         problem = semidiscretise(scene, 32 if n is None else n, ends="paper")
         step = min(problem.chain.k**2 / 8, suggest_dt(problem, "leapfrog")) if dt is None else dt
@@ -80,14 +88,16 @@ def solve(
         return simulate(problem, "leapfrog", dt=step, frames=frames, want=want, progress=progress)
     if n is not None or dt is not None:
         raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
-    tol = checks.number("tol", tol, positive=True)
-    if method in ("elements", "spectral"):
-        solver = solve_elements if method == "elements" else solve_spectral
-        return solver(scene, tol, frame_times(frames, scene.duration), progress)
-    return _richardson(scene, tol, frames, progress)
+    bound = bounds(tol, scene.steered)
+    times = frame_times(frames, scene.duration)
+    solver = {"elements": solve_elements, "spectral": solve_spectral, "richardson": _richardson}[method]
+    found = solver(scene, bound, times, progress)
+    drift = float(np.abs(found.energy - energy).max())
+    return replace(found, error_estimate=(found.error_estimate or {}) | {"energy": drift})
 
 
-def _richardson(scene: Scene, tol: float, frames: int | ArrayLike, progress: bool) -> Solution:
+def _richardson(scene: Scene, bound: Mapping[str, float], frames: NDArray, progress: bool) -> Solution:
+    tol = min(bound.values())
     # sweeps stop well below the tolerance: what each step leaves adds up over the steps
     method = Suzuki4(Midpoint(tolerance=min(1e-10, 1e-5 * tol)))
 
@@ -117,29 +127,27 @@ def _richardson(scene: Scene, tol: float, frames: int | ArrayLike, progress: boo
 
         steps = 25
         coarse = shown(COARSEST, steps)
-        while _worst(effect(coarse, halved := shown(COARSEST, 2 * steps))) > tol / 4:
+        while over(effect(coarse, halved := shown(COARSEST, 2 * steps)), bound) > 1 / 4:
             steps, coarse = 2 * steps, halved
         n, last = COARSEST, None
         while n < FINEST:
             fine = shown(2 * n - 1, steps)
             best = _extrapolate(scene, coarse, fine)
             space = largest(last, best, 1 / 3) if last is not None else dict.fromkeys(FIELDS, np.inf)
-            if _worst(space) <= 0.75 * tol:
+            if over(space, bound) <= 0.75:
                 # the step again, on the coarser of the two meshes that count: waves may be there that COARSEST does not hold
                 time = effect(coarse, shown(n, 2 * steps))
                 estimate = {name: space[name] + time[name] for name in FIELDS}
-                if _worst(estimate) <= tol:
+                if over(estimate, bound) <= 1:
                     stats = fine.stats | {"method": "richardson", "order": 2, "nodes": fine.s.size}
                     return replace(best, error_estimate=estimate, rolling_residual=None, stats=stats)
                 # a smaller step, to fall like its third power if not its fourth, and again from two meshes back
-                steps *= max(2, 2 ** int(np.ceil(np.log(4 * _worst(time) / tol) / np.log(8))))
+                steps *= max(2, 2 ** int(np.ceil(np.log(4 * over(time, bound)) / np.log(8))))
                 n = max(COARSEST, (n - 1) // 4 + 1)
                 coarse, last = shown(n, steps), None
                 continue
             n, coarse, last = 2 * n - 1, fine, best
-    raise ValueError(
-        f"tol = {tol:g} is not reached on {n} nodes, where the estimated error is {_worst(space):.1e}; ask for a larger tol"
-    )
+    raise ValueError(missed(space, bound, f"on {n} nodes"))
 
 
 def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:
@@ -157,7 +165,3 @@ def spline(scene: Scene, s: NDArray, values: NDArray) -> CubicSpline:
         return CubicSpline(s, values.T)
     around = np.append(s, scene.rod.length)
     return CubicSpline(around, np.concatenate([values, values[:, :1]], axis=1).T, bc_type="periodic")
-
-
-def _worst(errors: dict[str, float]) -> float:
-    return max(errors[name] for name in ("x", "y", "theta"))

@@ -8,6 +8,7 @@ the initial twist breaks a condition of the ends, leaves waves of wave number q 
 fall exponentially in the end, and how fast it falls cannot be told from the falls before.)
 """
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from continuum.bounds import FIELDS, missed, over
 from continuum.galerkin import SpectralRod
 from continuum.rod import Scene
 from discs import Gauss8, SimulationError, Solution
@@ -27,7 +29,6 @@ SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259)  # functions; odd, as a series h
 FEWEST = 16
 MOST_STEPS = FEWEST * 2**10
 NODES = 1025  # of a solution, so many that splines through them do for derivatives too
-FIELDS = ("x", "y", "theta", "omega")
 POSITIONS = FIELDS[:3]
 BENT = 1e-3  # curvature times the length at a free end, from which on a line is said to start bent there
 
@@ -112,11 +113,6 @@ def distances(a: dict[str, NDArray], b: dict[str, NDArray]) -> dict[str, float]:
     return {name: float(np.abs(a[name] - b[name]).max()) for name in FIELDS}
 
 
-def worst(errors: dict[str, float]) -> float:
-    """The largest error of positions and angles."""
-    return max(errors[name] for name in POSITIONS)
-
-
 def possible_steps(course: Course, sizes: tuple[int, ...], steps: int) -> int:
     """So many steps, or twice, four times, ... as many, that the motion can be followed on these numbers of functions."""
     last = None
@@ -133,10 +129,10 @@ def possible_steps(course: Course, sizes: tuple[int, ...], steps: int) -> int:
     raise _too_fast(course)
 
 
-def enough_steps(course: Course, n: int, steps: int, tol: float) -> int:
-    """So many steps, or twice, four times, ... as many, that their effect on n functions is below a quarter of tol."""
+def enough_steps(course: Course, n: int, steps: int, bound: Mapping[str, float]) -> int:
+    """So many steps, or twice, four times, ... as many, that their effect on n functions is below a quarter of the bounds."""
     while steps <= MOST_STEPS:
-        if worst(course.effect(n, steps)) <= tol / 4:
+        if over(course.effect(n, steps), bound) <= 1 / 4:
             return steps
         steps *= 2
     raise _too_fast(course)
@@ -166,8 +162,9 @@ def bent_hint(scene: Scene) -> str:
     return "; the line starts bent at a free end, which may be why: the end has no curvature and sends out ever shorter waves"
 
 
-def solve_spectral(scene: Scene, tol: float, times: NDArray, progress: bool) -> Solution:
-    """The fields of a scene with slaved headings at `times` (F,); see `continuum.solve`."""
+def solve_spectral(scene: Scene, bound: Mapping[str, float], times: NDArray, progress: bool) -> Solution:
+    """The fields of a scene with slaved headings at `times` (F,), within the bounds by name; see `continuum.solve`."""
+    tol = min(bound.values())
     with (
         tqdm(desc=f"field to {tol:g}", unit="run", delay=1, disable=not progress) as bar,
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),
@@ -177,10 +174,10 @@ def solve_spectral(scene: Scene, tol: float, times: NDArray, progress: bool) -> 
         for n, more in pairwise(SIZES):
             steps = possible_steps(course, (n, more), steps)
             space = distances(course.run(n, steps), course.run(more, steps))
-            if worst(space) <= tol / 2:
-                steps = enough_steps(course, n, steps, tol)
+            if over(space, bound) <= 1 / 2:
+                steps = enough_steps(course, n, steps, bound)
                 space = distances(course.run(n, steps), course.run(more, steps))
-            if worst(space) > tol / 2:
+            if over(space, bound) > 1 / 2:
                 continue
             time, found = course.effect(n, steps), course.run(n, steps)
             unit = {"x": scene.rod.length, "y": scene.rod.length}
@@ -188,7 +185,4 @@ def solve_spectral(scene: Scene, tol: float, times: NDArray, progress: bool) -> 
             estimate = {name: space[name] + time[name] + rest[name] for name in FIELDS}
             stats = {"method": "spectral", "order": None, "functions": n, "dt": scene.duration / steps, "steps": steps}
             return Solution(t=times, s=course.s, error_estimate=estimate, stats=stats, **found)
-    raise ValueError(
-        f"tol = {tol:g} is not reached on {n} functions, where the estimated error is {worst(space):.1e}; "
-        f"ask for a larger tol{course.hint}"
-    )
+    raise ValueError(missed(space, bound, f"on {n} functions") + course.hint)

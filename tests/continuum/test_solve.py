@@ -101,6 +101,21 @@ def test_paper_s_scheme_by_default():
     np.testing.assert_allclose(run.modified_energy, run.modified_energy[0], rtol=1e-11)
 
 
+def test_tolerance_of_quantities_by_name(paper_field):
+    """A mapping binds what it names, rates too, by either method; every field and the energy have an estimate."""
+    loose = solve(untwisting_rod(), 1e-3, frames=3, progress=False)
+    for wanted, method in (({"omega": 1e-4}, None), ({"omega": 1e-3, "theta": 1e-5}, None), ({"omega": 3e-2}, "richardson")):
+        field = solve(untwisting_rod(), wanted, method, frames=3, progress=False)
+        every, other = ((f.s.size - 1) // 128 for f in (field, paper_field))
+        for name, bound in wanted.items():
+            error = np.abs(getattr(field, name)[:, ::every] - getattr(paper_field, name)[:, ::other]).max()
+            assert error <= field.error_estimate[name] + paper_field.error_estimate[name]
+            assert field.error_estimate[name] <= bound
+            assert bound >= 1e-3 or loose.error_estimate[name] > bound  # a number binds other quantities
+        assert set(field.error_estimate) == {"x", "y", "theta", "omega", "energy"}
+        assert np.abs(field.energy - np.pi**4 / 80).max() <= field.error_estimate["energy"] + 1e-12
+
+
 def test_closed_rod_keeps_its_shift():
     run = solve(rolling_rod(amplitude=0.01, duration=1.0), 1e-6, progress=False)
     step = np.diff(run.x[-1], append=run.x[-1, 0] + 4.0)
@@ -111,6 +126,10 @@ def test_closed_rod_keeps_its_shift():
     ("arguments", "message"),
     [
         ({"tol": 0.0}, "tol must be a positive finite number; got 0.0"),
+        ({"tol": 1e-300}, "tol must be at least 1e-12"),
+        ({"tol": {"omega": -1}}, "tol of 'omega' must be a positive finite number; got -1"),
+        ({"tol": {"phi": 1e-3}}, "tol must be one of 'x', 'y', 'theta', 'omega'; got 'phi'"),
+        ({"tol": {}}, "tol must name at least one of 'x', 'y', 'theta', 'omega'"),
         ({"method": "magic"}, "method must be one of 'spectral', 'richardson', 'leapfrog'; got 'magic'"),
         ({"n": 32}, "n and dt belong to method='leapfrog'"),
         ({"dt": 0.1}, "n and dt belong to method='leapfrog'"),
@@ -121,6 +140,20 @@ def test_closed_rod_keeps_its_shift():
 def test_bad_solves_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         solve(untwisting_rod(), progress=False, **arguments)
+
+
+def test_only_scenes_are_solved():
+    with pytest.raises(ValueError, match=r"solve takes a Scene, .*; got Problem; simulate\(problem\) runs discs"):
+        solve(semidiscretise(untwisting_rod(), 9, "springs"))
+    with pytest.raises(ValueError, match="solve takes a Scene, .*; got Rod"):
+        solve(untwisting_rod().rod)
+
+
+@pytest.mark.parametrize("method", ["spectral", "richardson", "leapfrog"])
+def test_data_that_jump_are_refused_by_every_method(method):
+    step = Scene(rod=Rod(**PAPER), duration=1.0, initial=lambda s: (s, 0 * s, 1.0 * (s > 2.13), 0 * s))
+    with pytest.raises(ValueError, match="initial theta jumps by 1 at s = 2.13"):
+        solve(step, 1e-2, method, progress=False)
 
 
 def test_unreachable_tolerance_is_refused(monkeypatch):
