@@ -27,14 +27,15 @@ def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Ax
     Parameters
     ----------
     panels : "motion" (from above), "theta" and "omega" over (s, t), "end" (the first disc against time), "profiles" (theta along
-        the rod), "energy" (its error).
+        the rod), "energy" (its error). One disc has no theta, omega and profiles along s.
     ax : one axes for each panel, or None for a new figure.
 
     Raises
     ------
     ValueError : for an unknown panel, another number of axes, or a run of a single frame.
     """
-    names = [checks.choice("panel", name, PANELS) for name in panels] or list(PANELS)
+    every = [name for name in PANELS if run.s.size > 1 or name not in ALONG]
+    names = [checks.choice("panel", name, every) for name in panels] or every
     if ax is None:
         columns = min(len(names), 3)
         rows = -(-len(names) // columns)
@@ -145,6 +146,7 @@ PANELS = {
     "profiles": lambda run, ax: profiles(run, "theta", ax),
     "energy": energy_error,
 }
+ALONG = ("theta", "omega", "profiles")  # over s
 
 
 def vakonomic() -> Figure:

@@ -1,38 +1,52 @@
-"""How discs stand on the plane, for pictures: from what every Solution has.
+"""How discs stand on the plane, for pictures: from what every Solution has, and from a textbook's single disc.
 
 Disc i touches the plane at r_i = (x_i, y_i) and stands upright. Its axle points along the heading d_1, which is (cos phi, sin phi)
 of discs with a heading of their own and r'/|r'| of the others; it rolls along J d_1 (the paper's (constraintsphi):
 r. = R omega J d_1). The spoke that points up at theta = 0 is the paper's director d_3 = cos(theta) e_z + sin(theta) J d_1.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
+from discs.mechanics import Trajectory
 from discs.solution import Solution
+
+TOO_FAR = 0.2  # of the drawn radius: what a point of a rim may be off between two frames
 
 
 def is_ring(run: Solution) -> bool:
     """Whether the last disc is the first one's neighbour: never further from it than two of the longest links of the frame."""
+    if run.s.size <= 3:
+        return False
     r = np.stack([run.x, run.y])
     longest = np.hypot(*np.diff(r, axis=2)).max(axis=1)
-    return run.s.size > 3 and bool((np.hypot(*(r[..., -1] - r[..., 0])) <= 2 * longest).all())
+    return bool((np.hypot(*(r[..., -1] - r[..., 0])) <= 2 * longest).all())
 
 
 def slopes(run: Solution) -> NDArray:
-    """r', (F, 2, N): as recorded (want "slope"), or by central differences of the positions, one-sided at free ends."""
+    """r', (F, 2, N): as recorded (want "slope"), or by central differences of the positions, one-sided at free ends.
+
+    One disc has no line; its slope is that of a rod that its axle follows.
+    """
     if run.slope_x is not None and run.slope_y is not None:
         return np.stack([run.slope_x, run.slope_y], axis=1)
+    if run.s.size == 1:
+        return axles(run)
     r = np.stack([run.x, run.y], axis=1)
     if is_ring(run):
         return (np.roll(r, -1, axis=2) - np.roll(r, 1, axis=2)) / (2 * (run.s[1] - run.s[0]))
-    return np.gradient(r, run.s, axis=2, edge_order=2)
+    return np.gradient(r, run.s, axis=2, edge_order=2 if run.s.size > 2 else 1)
 
 
 def axles(run: Solution) -> NDArray:
     """Unit vectors d_1 along the axles, (F, 2, N); zero where r' is."""
     if run.phi is not None:
         return np.stack([np.cos(run.phi), np.sin(run.phi)], axis=1)
+    if run.s.size == 1:
+        raise ValueError("one disc has no line that its axle could follow: give its heading phi")
     slope = slopes(run)
     length = np.hypot(slope[:, 0], slope[:, 1])[:, None]
     return np.divide(slope, length, out=np.zeros_like(slope), where=length > 0)
@@ -57,7 +71,68 @@ def instants(run: Solution, count: int) -> NDArray:
 
 
 def drawn_radius(run: Solution, radius: float | None) -> float:
-    """The radius to draw discs with: as given, or an eighteenth of the rod, so that discs as large as the rod hide nothing."""
-    if radius is None:
+    """The radius to draw discs with: as given, or an eighteenth of the rod, so that discs as large as the rod hide nothing.
+
+    One disc is drawn as large as it is, or, where that is not known or 0, as an eighteenth of the way it goes.
+    """
+    if radius is not None:
+        return checks.number("radius", radius, positive=True)
+    if run.s.size > 1:
         return float(np.ptp(run.s)) / 18
-    return checks.number("radius", radius, positive=True)
+    return _radius(run) or float(max(np.ptp(run.x), np.ptp(run.y))) / 18 or 1.0
+
+
+def one_disc(path: Trajectory, radius: float) -> Solution:
+    """The motion of a single disc, coordinates (x, y, theta, phi) as of `textbook.rolling_disc`, as a run for pictures."""
+    if path.q.shape[1] != 4:
+        raise ValueError(f"one disc has the coordinates x, y, theta, phi; got {path.q.shape[1]} of them")
+    named = dict(zip(("x", "y", "theta", "phi"), path.q.T[..., None], strict=True))
+    rates = dict(zip(("x_rate", "y_rate", "omega", "phi_rate"), path.v.T[..., None], strict=True))
+    stats = {"method": "textbook", "radius": checks.number("radius", radius, positive=True)}
+    return Solution(t=path.t, s=np.zeros(1), **named, **rates, energy=path.energy, stats=stats)
+
+
+def _radius(run: Solution) -> float | None:
+    """R of all discs, if it is one number and known."""
+    told = run.problem.chain.radius if run.problem is not None else _scene(run).get("radius", run.stats.get("radius"))
+    return float(np.max(told)) if told is not None and np.ptp(told) == 0 else None
+
+
+def _scene(run: Solution) -> dict[str, Any]:
+    """What a field says of its scene, see `continuum.told`; empty of discs."""
+    scene = run.stats.get("scene")
+    return scene if isinstance(scene, dict) else {}
+
+
+def off_between_frames(run: Solution, radius: float) -> float:
+    """How far off straight lines between frames draw a point of a rim, at most, in parts of the drawn radius.
+
+    With the increment D of a quantity between two frames and its rates a, b there times the step, the cubic through all four
+    differs from the straight line by u (1 - u) [(1 - u) (a - D) - u (b - D)], at most a quarter of the larger of |a - D| and
+    |b - D|. Of theta the rates are omega. Positions move along J d_1 with the speed R omega (|r'| R omega, field law), and not
+    along the axle; without a known R only that they do not is used.
+    """
+    if run.t.size < 2:
+        return 0.0
+    h = np.diff(run.t)[:, None]
+    turned = _quarter(h, np.diff(run.theta, axis=0), run.omega)
+    r, along = np.stack([run.x, run.y], axis=1), axles(run)
+    way, size = np.diff(r, axis=0), _radius(run)
+    across = [np.abs((way * d).sum(axis=1)) for d in (along[:-1], along[1:])]
+    moved = 0.25 * np.maximum(*across)
+    if size is not None or run.x_rate is not None:
+        if run.x_rate is not None and run.y_rate is not None:
+            rate = np.stack([run.x_rate, run.y_rate], axis=1)
+        else:
+            rate = size * run.omega[:, None] * turn(slopes(run) if _field_law(run) else along)
+        moved = np.hypot(*(_quarter(h, way[:, j], rate[:, j]) for j in range(2)))
+    return float((turned + moved / radius).max())
+
+
+def _quarter(h: NDArray, change: NDArray, rate: NDArray) -> NDArray:
+    return 0.25 * np.maximum(np.abs(h * rate[:-1] - change), np.abs(h * rate[1:] - change))
+
+
+def _field_law(run: Solution) -> bool:
+    told = getattr(run.problem.chain, "rolling", None) if run.problem is not None else _scene(run).get("rolling")
+    return told == "field" and run.phi is None

@@ -1,10 +1,16 @@
 """A page to turn and play runs in three dimensions: one file, no network, for a browser or a notebook.
 
 The page holds three.js, the frames as base64 of 32-bit floats, little-endian, frame after frame, and a script; see `discs/data`.
-Between frames positions and angles are interpolated linearly in time.
+Between frames positions and angles are interpolated linearly in time, but where frames are so far apart that this would mislead
+(`poses.off_between_frames`): then frames are shown one by one, and the page says so.
+
+Data cannot become code: every "<" of them is written as an escape, and a content security policy lets the browser run the page's
+two scripts, known by their hashes, and load nothing. The page is ASCII, so that the hashes hold whatever encoding a browser
+presumes.
 """
 
 import base64
+import hashlib
 import html
 import json
 import re
@@ -65,7 +71,7 @@ def view(
     ----------
     path : where to write it, .html; None writes nothing.
     beside : another run, shown to the right at the same time and from the same place.
-    titles : one for each run; None takes the method and the number of discs.
+    titles : one for each run, strings; none takes the method and the number of discs.
     radius : to draw the discs with, length. None draws an eighteenth of the rod, which the page says: spokes turn by the true
         theta, so a disc drawn smaller than it is seems to slide.
     discs : about so many of a run are drawn, all of fewer than twice as many, and the rod through them.
@@ -74,46 +80,65 @@ def view(
 
     Raises
     ------
-    ValueError : for something else beside, another number of titles, a folder that is not there or another kind of file.
+    ValueError : for something else beside, another number of titles, a folder that is not there or another kind of file, a run
+        with values that are not finite, or one disc without a heading.
     """
     if beside is not None and not isinstance(beside, Solution):
         raise ValueError(f"beside must be another Solution; got {type(beside).__name__}")
     if path is not None:
         checks.choice("the page's ending", Path(path).suffix.lower(), (".html",))
     runs = [run] if beside is None else [run, beside]
+    if isinstance(titles, str) or not all(isinstance(title, str) for title in titles):
+        raise ValueError(f"titles must be a list of strings, one for each run; got {titles!r}")
     titles = list(titles) or [_title(r) for r in runs]
     if len(titles) != len(runs):
         raise ValueError(f"titles must be one for each of the {len(runs)} runs; got {len(titles)}")
     size = poses.drawn_radius(run, radius)
     about = checks.whole("discs", discs, 2)
     data = {
-        "runs": [_data(r, title, about) for r, title in zip(runs, titles, strict=True)],
+        "runs": [_data(r, title, about, size) for r, title in zip(runs, titles, strict=True)],
         "radius": size,
         "style": {"ink": INK, "grey": GREY, "ground": GROUND, "runs": [BLUE, ORANGE], "signed": SIGNED, "unsigned": UNSIGNED},
         "label": LABEL,
     }
     parts = {
-        "TITLE": html.escape(" and ".join(titles)),
-        "DATA": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
+        "TITLE": html.escape(" and ".join(titles)).encode("ascii", "xmlcharrefreplace").decode("ascii"),
+        "DATA": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
+        "STYLE": _data_file("view.css"),
         "SCRIPT": _data_file("view.js"),
         "THREE": _data_file("three.min.js"),
     }
-    page = re.sub("@(TITLE|DATA|SCRIPT|THREE)@", lambda mark: parts[mark[1]], _data_file("view.html"))
+    parts["POLICY"] = (
+        f"default-src 'none'; script-src {_hash(parts['THREE'])} {_hash(parts['SCRIPT'])}; style-src {_hash(parts['STYLE'])}; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    page = re.sub(f"@({'|'.join(parts)})@", lambda mark: parts[mark[1]], _data_file("view.html"))
     made = View(page)
     return made if path is None else made.save(path)
 
 
 def _title(run: Solution) -> str:
-    what = "discs" if run.error_estimate is None else "nodes of the field"
-    return ", ".join([f"{run.s.size} {what}", *filter(None, [run.stats.get("method")])])
+    what = "nodes of the field" if "scene" in run.stats else "disc" if run.s.size == 1 else "discs"
+    method = run.stats.get("method")
+    return ", ".join([f"{run.s.size} {what}", *([str(method)] if method else [])])
+
+
+def _hash(part: str) -> str:
+    """How a content security policy names an inline script or style."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(part.encode('utf-8')).digest()).decode('ascii')}'"
 
 
 def _data_file(name: str) -> str:
     return files("discs").joinpath("data", name).read_text(encoding="utf-8")
 
 
-def _data(run: Solution, title: str, about: int) -> dict[str, Any]:
+def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
     """What the page needs of a run; arrays (F, n) of the n discs drawn, the axles as unwrapped angles."""
+    for name in ("t", "x", "y", "theta", "omega", "energy", "phi"):
+        values = getattr(run, name)
+        if values is not None and not np.isfinite(values).all():
+            frame = int(np.argwhere(~np.isfinite(values))[0, 0])
+            raise ValueError(f"a page shows finite values; {name} is not at frame {frame} of {title!r}: view the frames before it")
     shown = poses.picked(run.s, about)
     axle, slope = poses.axles(run), poses.slopes(run)
     arrays = {
@@ -130,6 +155,7 @@ def _data(run: Solution, title: str, about: int) -> dict[str, Any]:
         "title": title,
         "n": int(shown.size),
         "ring": poses.is_ring(run),
+        "held": poses.off_between_frames(run, size) > poses.TOO_FAR,
         "t": run.t.tolist(),
         "energy": run.energy.tolist(),
         "drift": float(np.abs(run.energy - run.energy[0]).max()),

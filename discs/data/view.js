@@ -119,16 +119,18 @@
   }
   const panels = runs.map(build);
 
-  // ---- a frame: linear between the two recorded ones
-  function place(t, time) {
+  // ---- a frame: linear between the two recorded ones, or the one before where they are too far apart for that
+  function place({ t, held }, time) {
     let low = 0, high = t.length - 1;
     while (high - low > 1) { const m = (low + high) >> 1; if (t[m] <= time) low = m; else high = m; }
     const share = high > low ? (time - t[low]) / (t[high] - t[low]) : 0;
-    return [low, high, Math.min(Math.max(share, 0), 1)];
+    return [low, high, held ? Number(share >= 1) : Math.min(Math.max(share, 0), 1)];
   }
   const matrix = new THREE.Matrix4(), e1 = new THREE.Vector3(), e2 = new THREE.Vector3(), e3 = new THREE.Vector3();
-  function pose({ run, parts, tracks }, time) {
-    const n = run.n, [f, g, share] = place(run.t, time), scale = scales[at("colour").value];
+  function pose({ run, parts, tracks, when }, time) {
+    const n = run.n, [f, g, share] = place(run, time), scale = scales[at("colour").value];
+    const shown = (1 - share) * run.t[f] + share * run.t[g];
+    when.textContent = Math.abs(shown - time) > 1e-9 * (end - start) ? `shown at t = ${shown.toFixed(2)}` : "";
     const now = (values, i) => (1 - share) * values[f * n + i] + share * values[g * n + i];
     for (let i = 0; i < n; i++) {
       const x = now(run.x, i), y = now(run.y, i), axle = now(run.axle, i), theta = now(run.theta, i);
@@ -149,11 +151,12 @@
     }
     for (const part of Object.values(parts)) part.instanceMatrix.needsUpdate = true;
     parts.disc.instanceColor.needsUpdate = true;
-    tracks.geometry.setDrawRange(0, 2 * n * (time >= run.t.at(-1) ? run.t.length - 1 : f));
+    tracks.geometry.setDrawRange(0, run.held ? 0 : 2 * n * (time >= run.t.at(-1) ? run.t.length - 1 : f));
   }
 
   // ---- energy below: from zero, so that what is conserved looks so
   const strip = at("energy");
+  const short = (text) => { const signs = Array.from(text); return signs.length > 40 ? `${signs.slice(0, 39).join("")}\u2026` : text; };
   const top = 1.15 * (Math.max(...runs.map((run) => largest(run.energy, 0))) || 1);
   const edge = 16;
   const across = (time) => edge + (strip.clientWidth - 2 * edge) * (time - start) / (end - start || 1);
@@ -172,7 +175,7 @@
       pen.beginPath();
       run.t.forEach((time, f) => pen.lineTo(across(time), up(run.energy[f])));
       pen.stroke();
-      const text = `${j ? "- -" : "—"} energy ${run.energy[0].toPrecision(5)}, varies by ${run.drift.toExponential(0)}${runs.length > 1 ? ` (${run.title})` : ""}`;
+      const text = `${j ? "- -" : "\u2014"} energy ${run.energy[0].toPrecision(5)}, varies by ${run.drift.toExponential(0)}${runs.length > 1 ? ` (${short(run.title)})` : ""}`;
       pen.fillText(text, left, 14);
       left += pen.measureText(text).width + 28;
     });
@@ -244,14 +247,23 @@
   runs.forEach((run, j) => {
     const title = document.createElement("div");
     title.className = "title";
-    title.textContent = run.title;
+    const name = document.createElement("div"), when = panels[j].when = document.createElement("div");
+    name.className = "name";
+    name.textContent = run.title;
+    when.className = "when";
+    title.append(name, when);
     title.style.left = `${100 * j / runs.length}%`;
     title.style.width = `${100 / runs.length}%`;
     if (runs.length > 1) title.style.color = data.style.runs[j];
     if (j) title.style.borderLeft = "1px solid #ddd";
     stage.append(title);
   });
-  at("note").textContent = `radius drawn ${R.toPrecision(3)}`;
+  const held = runs.filter((run) => run.held).map((run) => `${short(run.title)}: its ${run.t.length} frames are too far apart to draw the motion between them, and are shown one by one; take more frames`);
+  at("note").replaceChildren(...[...held, `radius drawn ${R.toPrecision(3)}`].map((text) => {
+    const line = document.createElement("div");
+    line.textContent = text;
+    return line;
+  }));
   at("play").onclick = () => play(!playing);
   at("home").onclick = home;
   at("colour").onchange = legend;

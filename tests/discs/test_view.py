@@ -3,13 +3,17 @@ import io
 import json
 import re
 import shutil
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from discs import simulate
+from continuum import solve, untwisting_rod
+from continuum.mesh import semidiscretise
+from discs import Problem, State, SteeredChain, poses, simulate, textbook
+from discs.solution import Solution
 from discs.view import View, view
 from tests.conftest import Model, uneven
 
@@ -188,7 +192,7 @@ def test_two_runs_beside_each_other(browser, folder, run):
     unit = simulated("unit", ends="ring")
     page = run.view(folder / "both.html", beside=unit, titles=("field law", "a ring <b>&"))
     opened(browser, page)
-    assert [e.text for e in browser.find_elements("class name", "title")] == ["field law", "a ring <b>&"]
+    assert [e.text for e in browser.find_elements("class name", "name")] == ["field law", "a ring <b>&"]
     assert [o.get_attribute("value") for o in browser.find_elements("css selector", "#colour option")] == [
         "theta",
         "omega",
@@ -226,7 +230,102 @@ def test_notebooks_show_it(browser, folder, run):
     browser.switch_to.default_content()
 
 
+TITLES = [
+    "<!--<script>",
+    "</script><script>throw 1</script>",
+    "<!-- ' \" & &lt; @THREE@",
+    "Ü 転 \u202e \u2028 \ud800 \0 \\u003c",
+    "long " * 4000,
+]
+
+
+@pytest.mark.parametrize("title", TITLES, ids=["comment", "script", "quotes", "unicode", "long"])
+def test_a_title_is_shown_and_not_run(browser, folder, run, title):
+    opened(browser, run.view(folder / "run.html", titles=[title]))
+    shown = browser.execute_script("return Array.from(document.querySelector('.name').textContent, (c) => c.codePointAt(0))")
+    assert shown == [ord(c) for c in title]
+    assert browser.execute_script("return discs.panels.length") == 1
+    name, stage = (browser.find_element("css selector", part).rect for part in (".name", "#stage"))
+    assert name["height"] < 100 < stage["height"]
+    assert browser.get_log("browser") == []
+
+
+def test_only_the_pages_own_scripts_run(browser, folder, run):
+    """As if data had found a way to become markup: a script, a handler and a picture from elsewhere are put into the page."""
+    page = run.view().page
+    more = "<script>globalThis.hacked = 1</script><img src='data:,' onerror='globalThis.hacked = 2'><img src='https://localhost/a.png'>"
+    (folder / "more.html").write_text(page.replace("</body>", more + "</body>"), encoding="ascii")
+    browser.get((folder / "more.html").as_uri())
+    settle(browser)
+    assert time_of(browser) == "t = 0.00"
+    assert browser.execute_script("return globalThis.hacked ?? null") is None
+    refused = [entry["message"] for entry in browser.get_log("browser")]
+    assert len(refused) >= 3
+    assert all("Content Security Policy" in message for message in refused)
+
+
+def test_frames_too_far_apart_are_shown_one_by_one(browser, folder):
+    """The rod turns by half a radian more than a straight line between its two frames says: nothing is drawn between them."""
+    scene = untwisting_rod()
+    field = solve(scene, 1e-2, frames=2, progress=False)
+    fine = solve(scene, 1e-2, frames=46, progress=False)
+    opened(browser, fine.view(folder / "far.html", beside=field))
+    scrub(browser, 2.25)
+    assert [e.text for e in browser.find_elements("class name", "when")] == ["", "shown at t = 0.00"]
+    place = "return Array.from(discs.panels[arguments[0]].parts.disc.instanceMatrix.array.slice(0, 14))"
+    between, first = (np.array(browser.execute_script(place, panel))[[12, 13]] for panel in (0, 1))
+    assert first == pytest.approx([field.x[0, 0], field.y[0, 0]], abs=1e-6)
+    middle = simulate(Problem(*_chain(65)), dt=0.01, frames=[2.25], progress=False)
+    assert between == pytest.approx([middle.x[0, 0], middle.y[0, 0]], abs=0.02)
+    assert "its 2 frames are too far apart" in browser.find_element("id", "note").text
+    scrub(browser, 4.5)
+    assert [e.text for e in browser.find_elements("class name", "when")] == ["", ""]
+    last = np.array(browser.execute_script(place, 1))[[12, 13]]
+    assert last == pytest.approx([field.x[1, 0], field.y[1, 0]], abs=1e-6)
+
+
+def test_a_run_that_ends_before_the_other_says_so(browser, folder, run):
+    longer = simulate(uneven(6, Model("springs", "unit")), dt=0.05, frames=21, progress=False)
+    early = simulate(uneven(6, Model("springs", "field")), dt=0.05, frames=[0.0, 0.1, 0.2], progress=False)
+    opened(browser, longer.view(folder / "run.html", beside=early))
+    scrub(browser, 0.75)
+    assert [e.text for e in browser.find_elements("class name", "when")] == ["", "shown at t = 0.20"]
+
+
+@pytest.mark.parametrize("kind", ["two", "one"])
+def test_one_and_two_discs_can_be_seen(browser, folder, kind):
+    run = pair() if kind == "two" else single()
+    opened(browser, run.view(folder / "few.html", radius=0.4))
+    scrub(browser, float(run.t[1]))
+    got = browser.execute_script("return Array.from(discs.panels[0].parts.disc.instanceMatrix.array)")
+    d1, _, d3, at = np.moveaxis(np.reshape(got, (run.s.size, 4, 4))[..., :3], 1, 0)
+    phi, theta = run.phi[1], run.theta[1]
+    np.testing.assert_allclose(at[:, :2], np.stack([run.x[1], run.y[1]], axis=1), atol=2e-6)
+    np.testing.assert_allclose(d1[:, :2], np.stack([np.cos(phi), np.sin(phi)], axis=1), atol=2e-6)
+    np.testing.assert_allclose(d3[:, 2], np.cos(theta), atol=2e-6)
+    empty = np.asarray([252, 252, 250])
+    assert (abs(pixels(browser) - empty).max(axis=-1) > 30).mean() > 0.002
+    assert browser.get_log("browser") == []
+
+
 # ---- without a browser
+
+
+def _chain(n):
+    problem = semidiscretise(untwisting_rod(), n, "consistent")
+    return problem.chain, problem.initial, problem.duration
+
+
+def pair():
+    stiff = {"stretch_stiffness": 9.0, "shear_stiffness": 7.0, "torsion_stiffness": 0.9, "bending_stiffness": 0.8}
+    chain = SteeredChain(n=2, length=1.0, density=1.3, spin_inertia=0.6, heading_inertia=0.3, radius=0.7, **stiff)
+    problem = Problem(chain, State(chain.s, [0, 0], [0.4, -0.4], 0.5, [0.0, 0.3]), 1.0)
+    return simulate(problem, dt=0.05, frames=11, progress=False)
+
+
+def single():
+    book = textbook.rolling_disc(1.3, 0.6, 0.4, 0.7, roll_rate=1.1, turn_rate=0.8, slope=2.1)
+    return poses.one_disc(book.integrate(np.linspace(0, 2, 21)), 0.7)
 
 
 def data_of(page: View):
@@ -247,15 +346,50 @@ def test_page_holds_the_run(run):
 def test_page_is_small_and_takes_nothing_from_outside(run):
     page = run.view().page
     assert len(page.encode()) < 1.2e6
+    assert page.isascii()  # the hashes of its policy hold in whatever encoding it is read
     ours = page.replace(files("discs").joinpath("data", "three.min.js").read_text(encoding="utf-8"), "")
     assert not re.search(r"https?:|src=|@import|<link|url\(", ours)
 
 
-def test_titles_cannot_break_the_page(run):
-    title = "</script><script>throw 1</script> @THREE@"
+@pytest.mark.parametrize("title", TITLES, ids=["comment", "script", "quotes", "unicode", "long"])
+def test_titles_cannot_break_the_page(run, title):
     page = run.view(titles=[title])
-    assert page.page.count("</script>") == run.view().page.count("</script>")
+    assert page.page.count("<") == run.view().page.count("<")
     assert data_of(page)["runs"][0]["title"] == title
+
+
+def test_titles_from_what_a_file_says(run):
+    """Whatever a foreign archive has as its method; a run to a tolerance is one of discs, though it has an error estimate."""
+    for method, words in ((["<b>", 3], "['<b>', 3]"), (7, "7"), (None, "6 discs")):
+        odd = replace(run, stats=run.stats | {"method": method}, error_estimate={"x": 1e-3})
+        title = data_of(odd.view())["runs"][0]["title"]
+        assert words in title
+        assert title.startswith("6 discs")
+
+
+def test_how_far_lines_between_frames_are_off():
+    """A disc that rolls and turns evenly, theta = t and phi = t, on a circle of radius R: a chord is off by 1 - cos(h/2) of it, and
+    an angle that grows like t^2 is off by h^2/4 half way."""
+    t = np.linspace(0, 1.2, 4)
+    column, none = t[:, None], np.zeros((4, 1))
+    even = Solution(t=t, s=np.zeros(1), x=0.5 * np.cos(column), y=0.5 * np.sin(column), theta=column, omega=none + 1, energy=0 * t)
+    even = replace(even, phi=column)
+    h, radius = 0.4, 0.1
+    sagitta = 0.5 * (1 - np.cos(h / 2)) / radius
+    assert poses.off_between_frames(even, radius) == pytest.approx(sagitta, rel=0.02)
+    known = replace(even, stats={"radius": 0.5})
+    assert sagitta < poses.off_between_frames(known, radius) < 1.1 * sagitta
+    faster = replace(even, theta=column**2, omega=2 * column, x=none, y=none)
+    assert poses.off_between_frames(faster, radius) == pytest.approx(h**2 / 4)
+    assert poses.off_between_frames(replace(faster, stats={"radius": 0.5}), radius) > h**2 / 4
+
+
+def test_one_disc_from_above():
+    assert single().plot_motion() is not None
+    assert len(single().plot()) == 3
+    with pytest.raises(ValueError, match="panel must be one of 'motion', 'end', 'energy'; got 'theta'"):
+        single().plot("theta")
+    assert poses.drawn_radius(single(), None) == 0.7
 
 
 @pytest.mark.parametrize(
@@ -265,6 +399,8 @@ def test_titles_cannot_break_the_page(run):
         ({"path": "no/such/folder/rod.html"}, "path must be in a folder that exists; got 'no/such/folder/rod.html'"),
         ({"beside": "field"}, "beside must be another Solution; got str"),
         ({"titles": ["a", "b"]}, "titles must be one for each of the 1 runs; got 2"),
+        ({"titles": "a"}, "titles must be a list of strings, one for each run; got 'a'"),
+        ({"titles": [3]}, r"titles must be a list of strings, one for each run; got \[3\]"),
         ({"radius": -0.1}, "radius must be a positive finite number; got -0.1"),
         ({"discs": 1}, "discs must be a whole number of at least 2; got 1"),
     ],
@@ -272,3 +408,14 @@ def test_titles_cannot_break_the_page(run):
 def test_bad_input(run, change, message):
     with pytest.raises(ValueError, match=message):
         view(run, **change)
+
+
+def test_what_cannot_be_seen_is_refused(run):
+    broken = run.x.copy()
+    broken[3, 2] = np.nan
+    with pytest.raises(ValueError, match="a page shows finite values; x is not at frame 3 of '6 discs, midpoint'"):
+        replace(run, x=broken).view()
+    with pytest.raises(ValueError, match="one disc has no line that its axle could follow: give its heading phi"):
+        replace(single(), phi=None).view()
+    with pytest.raises(ValueError, match="one disc has the coordinates x, y, theta, phi; got 3 of them"):
+        poses.one_disc(textbook.knife_edge(1.3, 0.4, slope=0.0, speed=1.0, turn_rate=0.5).integrate([0.0, 1.0]), 0.7)
