@@ -50,12 +50,21 @@ def _outcome(problem: Problem, run: Callable) -> Outcome:
 
 
 def peers(problem: Problem) -> list[Peer]:
-    """The peers that are installed and can express the problem, at sizes they can bear."""
+    """The peers that are installed and can express the problem, at sizes they can bear.
+
+    True curvature is written for those that take the right-hand side or the saddle point from us: SciPy, CVODE, the saddle point.
+    """
     f = reduced.Bound(problem)
     n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
     found = reduced.scipy_peers(problem, f)
     if find_spec("sksundae"):
-        found += [*reduced.sundials_peers(problem, f), multipliers.multiplier_peer(problem)]
+        found += reduced.sundials_peers(problem, f)
+    if n <= 128:
+        found.append(multipliers.saddle_peer(problem))
+    if problem.system.kernel is None:
+        return found
+    if find_spec("sksundae"):
+        found.append(multipliers.multiplier_peer(problem))
     if find_spec("diffrax") and problem.chain.ends == "springs":
         from compare.peers.in_jax import diffrax_peers
 
@@ -69,6 +78,4 @@ def peers(problem: Problem) -> list[Peer]:
         from compare.peers.mujoco_discs import mujoco_peer
 
         found += [mujoco_peer(problem), mujoco_peer(problem, second_order=False)]
-    if n <= 128:
-        found.append(multipliers.saddle_peer(problem))
     return found

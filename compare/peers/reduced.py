@@ -1,7 +1,7 @@
 """Peers that take a right-hand side, the reduced equations: SciPy and SUNDIALS.
 
 All get the same compiled function, y. = f(t, y) with y = (x, y, theta, pi, ...) disc by disc, bound to its chain so that a call
-costs no more than a call must.
+costs no more than a call must. Chains without a compiled form (true curvature) get the plain one, as our own methods do.
 """
 
 import time as clock
@@ -17,7 +17,14 @@ from discs.integrators.ivp import Reduced
 
 
 def bound(problem: Problem) -> Callable[[float, NDArray, NDArray], None]:
-    """f(t, y, out), compiled for one chain, whose parameters become constants of the code."""
+    """f(t, y, out), compiled for one chain, whose parameters become constants of the code; in NumPy where there is no such form."""
+    if problem.system.kernel is None:
+        plain = Reduced(problem.system)
+
+        def in_numpy(t: float, y: NDArray, out: NDArray) -> None:
+            out[:] = plain(t, y)
+
+        return in_numpy
     import numba
 
     from discs.kernels import methods
