@@ -144,9 +144,10 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
             steps *= 4 if attempt else 1
         return taken * max(whole / steps, 1.0)
 
-    def run(integrator: str | Integrator, h: float, times: NDArray) -> Solution:
+    def run(problem: Problem, integrator: str | Integrator, h: float, times: NDArray) -> Solution:
         if (expected := foretold(integrator, h)) > seconds - sum(cost):
             raise Slow(expected)
+        heard.clear()  # the last run counts, not those that the search for a step began with
         found, taken = timed(problem, integrator, h, times)
         cost.append(taken)
         return found
@@ -159,7 +160,7 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
                 done = to_tolerance(problem, "auto", TOL, times, run)
             else:
                 dt = suggest_dt(problem, method) if dt is None else dt
-                done = run(method, dt, times)
+                done = run(problem, method, dt, times)
         except ValueError as error:
             return Found("refused", 0.0, seconds=spent(), says=str(error)), None
         except (SimulationError, ArithmeticError) as error:

@@ -16,6 +16,7 @@ from discs.problem import Problem
 from discs.simulation import ENGINES, WANTS, simulate
 from discs.solution import Solution
 from discs.stencils import ENDS
+from discs.trust import doubts
 
 OFFERS = sorted({name for method in METHODS.values() for name in method.offers})
 
@@ -29,9 +30,19 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
         default="springs",
         help="how the free ends are treated (default: springs)",
     )
-    p.add_argument("--method", choices=("auto", *METHODS), metavar="NAME", help=f"auto, {', '.join(METHODS)} (default: midpoint)")
-    p.add_argument("--dt", metavar="DT", type=float, help="time step, time (default: suggested from the chain, and said)")
-    p.add_argument("--tol", metavar="TOL", type=float, help="instead of --dt: largest error, relative (default: none)")
+    p.add_argument(
+        "--method",
+        choices=("auto", *METHODS),
+        metavar="NAME",
+        help=f"auto, {', '.join(METHODS)} (default: auto; midpoint with --dt)",
+    )
+    p.add_argument("--dt", metavar="DT", type=float, help="time step, time (default: suggested for the method, and said)")
+    p.add_argument(
+        "--tol",
+        metavar="TOL",
+        type=float,
+        help="instead of --dt: largest error, relative (default: 1e-3, without --dt and --method)",
+    )
     p.add_argument("--frames", metavar="F", type=int, default=101, help="frames, equally spaced over the time (default: 101)")
     p.add_argument(
         "--want", metavar="NAME", nargs="+", default=[], help=f"record also {', '.join((*WANTS, *OFFERS))} (default: none)"
@@ -75,15 +86,8 @@ def run_discs(problem: Problem, options: argparse.Namespace) -> None:
         "engine": options.engine,
         "progress": not options.quiet,
     }
-    method = options.method or "midpoint"
-    several = method == "auto" or options.tol is not None
-    clear_way(options, whole=several)
-    if several:
-        run = simulate(problem, method, options.dt, tol=options.tol, **settled)
-        if options.save:
-            run.save(options.save)
-    else:
-        run = simulate(problem, method, options.dt, checkpoint=options.save, **settled)
+    clear_way(options, whole=False)
+    run = simulate(problem, options.method, options.dt, tol=options.tol, checkpoint=options.save, **settled)
     print(summary(run))
     if options.save:
         print(f"written to {options.save}")
@@ -119,6 +123,7 @@ def summary(run: Solution) -> str:
     lines.append(f"energy {run.energy[0]:.9g}, changed by {drift:.1e} at most")
     if run.rolling_residual is not None:
         lines.append(f"largest slip {run.rolling_residual.max():.1e}")
+    lines += [f"not to be trusted: {doubt}" for doubt in doubts(stats)]
     if run.error_estimate:
         errors = ", ".join(f"{name} {error:.1e}" for name, error in run.error_estimate.items())
         lines.append(f"estimated error: {errors}")

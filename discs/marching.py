@@ -11,10 +11,12 @@ from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
 from discs.system import Phase, Placed, RollingDiscs
+from discs.trust import Watch, converging
 from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which it is said
 _PREPARED: set[tuple[type, type]] = set()
+WATCHED = ("total", "size", "count", "due")  # of a watch, what a run goes on from
 CHUNK = 4_000_000  # discs times steps of a compiled call: some tenths of a second, then progress is shown and Ctrl-C heard
 
 
@@ -24,14 +26,15 @@ class SimulationError(RuntimeError):
     Attributes
     ----------
     step, time, disc : where it stopped.
+    slope : |r'| of a disc that lost its heading, at the last step before; NaN for other causes.
     """
 
-    def __init__(self, message: str, step: int, time: float, disc: int) -> None:
+    def __init__(self, message: str, step: int, time: float, disc: int, slope: float = np.nan) -> None:
         super().__init__(f"{message} (step {step}, time {time:g}, disc {disc})")
-        self.message, self.step, self.time, self.disc = message, step, time, disc
+        self.message, self.step, self.time, self.disc, self.slope = message, step, time, disc, slope
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.message, self.step, self.time, self.disc)
+        return type(self), (self.message, self.step, self.time, self.disc, self.slope)
 
 
 def _warn_of_lost_digits(system: RollingDiscs, h: float) -> None:
@@ -56,16 +59,21 @@ class March:
     problem, integrator, h : what runs, how, and in which steps.
     compiled : use the chain's compiled form.
     quiet : do not say that kernels are being compiled.
+    watch : where the error of the steps is looked at; None nowhere.
 
     Attributes
     ----------
     step : steps taken.
+    stuck : some states from which steps did not converge, and how many steps were taken from each.
     work : what they cost.
     memory : what the integrator remembers.
     """
 
-    def __init__(self, problem: Problem, integrator: Integrator, h: float, compiled: bool, quiet: bool) -> None:
-        self.problem, self.integrator, self.h = problem, integrator, h
+    def __init__(
+        self, problem: Problem, integrator: Integrator, h: float, compiled: bool, quiet: bool, watch: Watch | None = None
+    ) -> None:
+        self.problem, self.integrator, self.h, self.watch = problem, integrator, h, watch
+        self.stuck: list[tuple[Any, int]] = []
         self.system, self.work, self.step = problem.system, Work(), 0
         self.kernel = self.system.kernel if compiled else None
         self.twin = integrator if self.kernel is not None and isinstance(integrator, FixedStep) else None  # steps compiled
@@ -101,22 +109,56 @@ class March:
     def keep(self) -> dict[str, Any]:
         """All that the run goes on from, as arrays and numbers by name."""
         work = {f"work.{name}": value for name, value in vars(self.work).items()}
-        return {"step": self.step} | work | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
+        seen = {f"watch.{name}": getattr(self.watch, name) for name in WATCHED} if self.watch else {}
+        return {"step": self.step} | work | seen | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
 
     def recall(self, kept: dict[str, Any]) -> None:
         """Go on from what was kept of the same run."""
         self.step = int(kept["step"])
         for name in vars(self.work):
             setattr(self.work, name, int(kept[f"work.{name}"]))
+        if self.watch:
+            for name in WATCHED:
+                value = kept[f"watch.{name}"]
+                setattr(self.watch, name, value if value.ndim else value.item())
         of_memory = {name.removeprefix("memory."): value for name, value in kept.items() if name.startswith("memory.")}
         self.memory = self.integrator.recall(self.memory, of_memory)
 
     def to(self, step: int) -> Iterator[int]:
         """Go on to a step; yields how many steps were taken at a time."""
+        watch = self.watch
         while self.step < step:
-            taken = self._plain() if self.twin is None else self._compiled(self.twin, min(self.chunk, step - self.step))
+            before, stuck = self.memory, self.work.unconverged
+            most = min(self.chunk, step - self.step)
+            if watch is not None and watch.due < self.step + most:
+                most = watch.due - self.step or 1
+            taken = self._plain() if self.twin is None else self._compiled(self.twin, most)
+            if self.work.unconverged > stuck:
+                self._remember(before, taken, stuck)
+            if watch is not None and watch.due == self.step:
+                finer = self.integrator.finer(self.system, before, self.h, self.kernel)
+                watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
             self.step += taken
             yield taken
+
+    def compare_short(self, tau: float) -> None:
+        """Show a run to the watch that is one step shorter than h."""
+        finer = self.integrator.finer(self.system, self.memory, tau, self.kernel)
+        if self.watch and finer is not None:
+            one = self.integrator.at(self.system, self.memory, tau, self.h, Work(), self.kernel)
+            self.watch.compare(one.hi, finer)
+
+    def _remember(self, before: Any, steps: int, stuck: int) -> None:
+        """Keep a state from which steps did not converge, whenever their number has doubled: the first and the last three."""
+        if not stuck or stuck.bit_length() < self.work.unconverged.bit_length():
+            self.stuck = [*self.stuck[:1], *self.stuck[1:][-2:], (before, steps)]
+
+    def remedy(self) -> dict[str, float]:
+        """A step that converges where the run's did not, by the name that `stats` has for it; empty if it is not known."""
+        if not self.stuck or not isinstance(self.integrator, FixedStep):
+            return {}
+        tried = (converging(self.system, self.integrator, *place, self.h, self.kernel) for place in self.stuck)
+        return {"converging_dt": min(tried)}
 
     def frame(self, tau: float) -> Frame:
         """The discs a time 0 <= tau < h after the last step."""
@@ -126,18 +168,22 @@ class March:
         except ArithmeticError as error:
             raise self._gave_up(error) from None
         if tau:
+            if self.work.unconverged > stuck:
+                self._remember(self.memory, 1, stuck)
             time = self.step * self.h + tau
             by_velocity = self.explicit or self.work.unconverged > stuck
             lost = frame.lost if frame.lost >= 0 else self._lost(self.memory, frame, tau, by_velocity)
-            self._check_heading(lost, self.step, time)
+            self._check_heading(lost, self.step, time, self.memory)
             self._check_energy(self.system.kinetic(frame.rate), frame, self.step, time)
         return frame
 
     def observe(self, frame: Frame) -> dict[str, Any]:
         """What every frame records, by the names that `Solution` has for it."""
         system = self.system
-        if self.kernel is not None:
-            from discs.kernels import methods
+        if frame.seen is not None:
+            q, energy, slip = frame.seen
+        elif self.kernel is not None:
+            import discs.kernels.methods as methods
 
             q = np.empty_like(frame.hi)
             energy, slip = methods.observe(self.kernel, frame.hi, frame.lo, frame.rate, q)
@@ -158,7 +204,7 @@ class March:
             raise self._gave_up(error) from None
         # leapfrog remembers more than a state; its moves are its velocity
         by_velocity = self.work.unconverged > stuck or (self.explicit and isinstance(previous, Phase))
-        self._check(self._lost(previous, self.memory, self.h, by_velocity), self.step + 1)
+        self._check(self._lost(previous, self.memory, self.h, by_velocity), self.step + 1, previous)
         return 1
 
     def _lost(self, before: Any, after: Placed, h: float, by_velocity: bool) -> int | None:
@@ -177,23 +223,28 @@ class March:
         return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)
 
     def _compiled(self, twin: FixedStep, steps: int) -> int:
-        self.memory, tally = twin.march(self.kernel, self.memory, self.h, steps, self.bound)
+        previous = self.memory
+        self.memory, tally = twin.march(self.kernel, previous, self.h, steps, self.bound)
         self.work.add(tally)
-        self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps)
+        if tally.lost >= 0:
+            previous, _ = twin.march(self.kernel, previous, self.h, tally.steps - 1, self.bound)
+        self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
         return tally.steps
 
-    def _check(self, lost: int | None, step: int) -> None:
-        self._check_heading(lost, step, step * self.h)
+    def _check(self, lost: int | None, step: int, before: Any) -> None:
+        self._check_heading(lost, step, step * self.h, before)
         self._check_energy(self.integrator.kinetic(self.system, self.memory, self.h), None, step, step * self.h)
 
-    def _check_heading(self, lost: int | None, step: int, time: float) -> None:
+    def _check_heading(self, lost: int | None, step: int, time: float, before: Any) -> None:
         if lost is not None:
+            slope = np.hypot(*self.system.slope(self.system.shape(before.hi, before.lo)))[lost]
             raise SimulationError(
                 "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
                 "end the run earlier, or take a smaller dt if the motion is not resolved",
                 step,
                 time,
                 lost,
+                float(slope),
             )
 
     def _check_energy(self, kinetic: float, frame: Frame | None, step: int, time: float) -> None:

@@ -10,14 +10,16 @@ import threading
 import time as clock
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import archive
+from discs import archive, checks
 from discs.framefile import DAMAGE, FrameFile, fresh
+from discs.integrators import Integrator, from_settings
 from discs.marching import March
 from discs.problem import Problem
 from discs.solution import Solution
@@ -68,15 +70,18 @@ class Recording(Rows):
     ----------
     path : the file; made anew, or that of the same run, which then goes on.
     about : what is known of `stats` from the start.
+    estimate : of the run's error, if it is known.
 
     Raises
     ------
     ValueError : if there is another run in the file, or something else.
     """
 
-    def __init__(self, problem: Problem, times: NDArray, path: str | Path, about: dict[str, Any]) -> None:
+    def __init__(
+        self, problem: Problem, times: NDArray, path: str | Path, about: dict[str, Any], estimate: dict[str, float] | None = None
+    ) -> None:
         super().__init__(problem, times)
-        self.path, self.about = Path(path), about
+        self.path, self.about, self.estimate = Path(path), about, estimate
         self.restart = self.path.with_name(self.path.name + ".restart")
         self.file: FrameFile | None = None
         self.asked = False  # to stop
@@ -124,7 +129,7 @@ class Recording(Rows):
     def write(self, f: int, found: dict[str, Any]) -> None:
         if self.file is None:
             self.restart.unlink(missing_ok=True)  # of a run that is no more
-            head = archive.header(self.problem, self.times, self.problem.chain.s, self.about, None, False)
+            head = archive.header(self.problem, self.times, self.problem.chain.s, self.about, self.estimate, False)
             with fresh(self.path) as temporary:
                 FrameFile.create(temporary, head, {name: np.shape(value) for name, value in found.items()}).__exit__()
             self.file = FrameFile.open(self.path, writable=True)
@@ -169,6 +174,21 @@ class Recording(Rows):
         if "phi" in file and "phi_rate" not in file:
             told = "was begun by an older version, which did not record phi_rate"
             raise ValueError(f"{self.path} {told}; give another path, or delete it")
+
+
+def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> tuple[Integrator, float] | None:
+    """Integrator and step of the run in a file, None if there is no file; ValueError if it was made for another tolerance."""
+    if not Path(path).exists():
+        return None
+    with FrameFile.open(path) as file:
+        stats = file.attrs["stats"]
+    if tol is not None and stats.get("tol") != tol:
+        told = f": {stats.get('tol')} there, {tol} here"
+        raise ValueError(f"{path} holds another run, whose tol differs{told}; give another path, or delete it")
+    try:
+        return from_settings(str(stats["settings"])), checks.number("dt", stats["dt"], positive=True)
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{path} holds no run that can go on: {error}; give another path, or delete it") from None
 
 
 def read_restart(path: Path) -> dict[str, Any]:

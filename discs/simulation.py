@@ -1,7 +1,7 @@
 """The one door to a run: `simulate(problem, method, ...)`."""
 
 import time as clock
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,85 +9,128 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
-from discs.integrators import Integrator, find
+from discs.integrators import Integrator, find, from_settings
 from discs.integrators.base import Frame
 from discs.marching import March
 from discs.problem import Problem
-from discs.recording import Recording, Rows
+from discs.recording import Recording, Rows, kept_settings
 from discs.solution import Solution
 from discs.step import suggest_dt
 from discs.system import RollingDiscs
-from discs.tolerance import to_tolerance
+from discs.tolerance import USUAL, NotReached, some_of, to_tolerance
+from discs.trust import Watch, cure, doubts
 from discs.warn import warn
 
 WANTS = ("velocity", "slope", "contact_force")
 MOST_STEPS = 2.0**53
 ENGINES = ("compiled", "plain")
-ROUNDING = 1e-12  # of the duration: a frame so far outside it is at its end
+ROUNDING = 1e-12  # of the duration: a frame or a step so much beyond it is at its end
 LOST = 0.01  # of the energy: a run is warned of
 
 
 def simulate(
     problem: Problem,
-    method: str | Integrator = "midpoint",
+    method: str | Integrator | None = None,
     dt: float | None = None,
     frames: int | ArrayLike = 101,
     want: Iterable[str] = (),
     progress: bool = True,
     engine: str = "compiled",
-    tol: float | None = None,
+    tol: float | Mapping[str, float] | None = None,
     checkpoint: str | Path | None = None,
 ) -> Solution:
     """Run a problem.
+
+    With neither method nor dt nor tol it is "auto" to a tolerance of 1e-3, and a warning where that is not reached.
 
     Parameters
     ----------
     problem : what to compute.
     method : name of an integrator (`discs.integrators.METHODS`; docs/choosing.md says which when), one with its own settings, as
-        `Midpoint(sweeps=2)`, or "auto".
-    dt : time step, for SciPy's methods the longest; None takes `suggest_dt(problem, method)`.
+        `Midpoint(sweeps=2)`, or "auto". None takes "midpoint" if dt is given, otherwise "auto".
+    dt : time step, at most the duration; for SciPy's methods the longest. None takes `suggest_dt(problem, method)`.
     frames : how many frames, equally spaced over the duration, or their times, increasing. A frame between two steps is
         reached by a shorter step of its own, so asking for frames never changes the trajectory.
     want : what else to record: "velocity", "slope", "contact_force", and what the method offers (leapfrog: "modified_energy").
     progress : show a progress bar on anything that takes over a second.
     tol : instead of dt: runs with smaller and smaller steps until x, y, theta (and phi) are within this, relative to the
-        largest value of each; see `discs.tolerance`. method="auto" chooses the method too, and takes 1e-3 if it is not given.
+        largest value of each, or, as {"omega": 1e-4}, the quantities named; see `discs.tolerance`.
     checkpoint : a file, as "run.nc", that frames are written to as they come, in bounded memory. If it is there, the run that it
-        holds goes on where it was interrupted, to the same bits as one unbroken run; see docs/archives.md.
+        holds goes on where it was interrupted, to the same bits as one unbroken run; see docs/archives.md. With tol (or "auto", or
+        nothing) method and step are found first, by runs of at most 101 frames in memory; a run that goes on has those of its file.
     engine : "compiled", or "plain" for the same in NumPy and SciPy. Discs with true curvature have only the plain form.
 
     Returns
     -------
-    Solution with exactly the frames asked for. A warning says where more than a hundredth of the energy was lost or gained.
+    Solution with exactly the frames asked for. A warning says where more than a hundredth of the energy was lost or gained, where
+    steps did not converge, and where dt is so long that positions or angles are off by more than a twentieth (`discs.trust`).
 
     Raises
     ------
-    ValueError : for an unknown method or quantity, a step that is not positive, or frames outside the duration; for a checkpoint
-        that holds another run or something else.
+    ValueError : for an unknown method or quantity, a step that is not positive or longer than the duration, or frames outside it;
+        for a checkpoint that holds another run or something else.
     KeyboardInterrupt : on Ctrl-C; with a checkpoint between two steps, and all so far is kept.
     SimulationError : as soon as the kinetic energy exceeds ten times the total energy of the start, which no exact
-        motion does, something is not finite, or (rolling="unit") a disc loses its heading.
+        motion does, something is not finite, or (rolling="unit") a disc loses its heading; where `tol` is not reached.
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
-    if method == "auto" or tol is not None:
+    nothing = method is None and dt is None
+    if method == "auto" or tol is not None or nothing:
         if dt is not None:
             raise ValueError("give dt or tol, not both: tol (and method='auto') finds the step")
-        if checkpoint is not None:
-            raise ValueError(
-                "a checkpoint keeps one run, and tol (or method='auto') makes several: give a method and dt, or save the run"
-            )
-
-        def run(integrator: Integrator, dt: float, times: NDArray) -> Solution:
-            return _run(problem, integrator, dt, times, want, progress, engine, None)
-
-        times = frame_times(frames, problem.duration)
-        found = to_tolerance(problem, method, 1e-3 if tol is None else tol, times, run)
+        found, doubt = _search(problem, method or "auto", frames, want, progress, engine, tol, checkpoint)
     else:
-        found = _run(problem, find(method), dt, frames, want, progress, engine, checkpoint)
-    if warning := lost_energy(problem, found.stats["method"], found.t, found.energy):
+        found, doubt = _run(problem, find(method or "midpoint"), dt, frames, want, progress, engine, checkpoint), ""
+    if warning := doubted(problem, found) + doubt:
         warn(warning)
     return found
+
+
+def doubted(problem: Problem, run: Solution) -> str:
+    """What to warn of where a run is not to be trusted; empty where it may be."""
+    method = run.stats["method"]
+    said = lost_energy(problem, method, run.t, run.energy)
+    if reasons := doubts(run.stats):
+        said += (
+            f"{' ' if said else ''}{method}: {'; '.join(reasons)}: the run may not be trusted; take {cure(run.stats)}, or tol=1e-3"
+        )
+    return said
+
+
+def _search(
+    problem: Problem,
+    method: str | Integrator,
+    frames: int | ArrayLike,
+    want: Iterable[str],
+    progress: bool,
+    engine: str,
+    tol: float | Mapping[str, float] | None,
+    checkpoint: str | Path | None,
+) -> tuple[Solution, str]:
+    """A run to a tolerance, and what to warn of. Arguments as of `simulate`."""
+
+    def run(problem: Problem, integrator: Integrator, dt: float, times: NDArray) -> Solution:
+        return _run(problem, integrator, dt, times, want, progress, engine, None, False)
+
+    want = _wanted(want, () if method == "auto" else find(method).offers)
+    times, doubt = frame_times(frames, problem.duration), ""
+    kept = None if checkpoint is None else kept_settings(checkpoint, tol)
+    if kept is not None:
+        return _run(problem, *kept, times, want, progress, engine, checkpoint, False), ""
+    looked_at = times if checkpoint is None else some_of(times)
+    try:
+        found = to_tolerance(problem, method, USUAL if tol is None else tol, looked_at, run, want)
+    except NotReached as error:
+        if tol is not None or method != "auto":
+            raise
+        found, doubt = error.best, f"{error.message}: this is the last run"
+    if checkpoint is not None:
+        integrator, dt = from_settings(found.stats["settings"]), found.stats["dt"]
+        more = {"tol": found.stats["tol"], "attempts": found.stats["attempts"]}
+        known = found.error_estimate
+        found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, more, known)
+    return found, doubt
 
 
 def lost_energy(problem: Problem, method: str, t: NDArray, energy: NDArray) -> str:
@@ -111,12 +154,20 @@ def _run(
     progress: bool,
     engine: str,
     checkpoint: str | Path | None,
+    checked: bool = True,
+    more: dict[str, Any] | None = None,
+    estimate: dict[str, float] | None = None,
 ) -> Solution:
-    """One run; the arguments are those of `simulate`."""
-    want = _wanted(want, integrator)
+    """One run; the arguments are those of `simulate`.
+
+    checked : look at the error of the steps. more : what else `stats` tells. estimate : of the error, if it is known.
+    """
+    want = _wanted(want, integrator.offers)
     compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
+    if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
+        raise ValueError(f"dt must be at most the duration, {problem.duration:g}; got {h:g}")
     times = frame_times(frames, problem.duration)
     end = float(times[-1])
     if end / h > MOST_STEPS:
@@ -133,17 +184,19 @@ def _run(
         "want": list(want),
         "dt": h,
         "dt_suggested": suggested,
-    }
-    record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about)
+    } | (more or {})
+    record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about, estimate)
+    steps, rest = steps_before(end, h)
+    watch = Watch(steps) if checked and not integrator.adaptive else None
     started = clock.perf_counter()
     with (
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),
-        Progress(integrator.name, steps_before(end, h)[0], progress) as shown,
+        Progress(integrator.name, steps, progress) as shown,
         record,
     ):
         if record.complete:
             return record.solution({})
-        march = March(problem, integrator, h, compiled, quiet=not progress)
+        march = March(problem, integrator, h, compiled, not progress, watch)
         first = record.begin(march)
         shown.update(march.step)
         for f in range(first, times.size):
@@ -153,8 +206,15 @@ def _run(
                 record.pause(f, march)
             record.write(f, _observed(march, rest, want, bool(offered)))  # not kept here: the next step needs the room
             record.pause(f + 1, march)
-        seconds = record.seconds + clock.perf_counter() - started
-        return record.solution(about | {"steps": march.step, **vars(march.work), "seconds": seconds})
+        told: dict[str, Any] = about | {"steps": march.step, **vars(march.work)}
+        if march.work.unconverged:
+            short = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
+            told |= {"short_steps": short} | march.remedy()
+        if watch is not None:
+            if rest and not steps:
+                march.compare_short(rest)
+            told["step_error"] = watch.error()
+        return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started})
 
 
 def _observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:
@@ -205,11 +265,13 @@ class Progress:
             self._bar = tqdm(total=self._total, initial=self._done, desc=self._name, unit="step")
 
 
-def _wanted(want: Iterable[str], integrator: Integrator) -> tuple[str, ...]:
+def _wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
+    if want == ():
+        return ()
     if not isinstance(want, Iterable):
         raise ValueError(f"want must be names of quantities; got {checks.shown(want)}")
     given = (want,) if isinstance(want, str) else tuple(want)
-    return tuple(checks.choice("want", name, (*WANTS, *integrator.offers)) for name in given)
+    return tuple(checks.choice("want", name, (*WANTS, *offers)) for name in given)
 
 
 def steps_before(time: float, h: float) -> tuple[int, float]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.problem import Problem, State
+from discs.trust import doubts
 
 if TYPE_CHECKING:
     import xarray
@@ -73,7 +74,8 @@ class Solution:
         drift = np.abs(self.energy - self.energy[0]).max()
         return (
             f"Solution({frames} frames of {n} discs, t = {self.t[0]:g} to {self.t[-1]:g}, "
-            f"method {self.stats.get('method')!r}, energy {self.energy[0]:.6g} to within {drift:.1e})"
+            f"method {self.stats.get('method')!r}, energy {self.energy[0]:.6g} to within {drift:.1e}"
+            f"{''.join(f'; {doubt}' for doubt in doubts(self.stats))})"
         )
 
     def __getitem__(self, frames: slice | NDArray | Sequence[int]) -> "Solution":

@@ -1,101 +1,235 @@
 """A run to a tolerance: which method, which step, by comparing runs with steps that shrink."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
-from discs.integrators import Gauss6, Integrator, Midpoint, find
+from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find
 from discs.integrators.composition import Composition
 from discs.integrators.gauss import Gauss
 from discs.marching import SimulationError
-from discs.problem import Problem
+from discs.problem import Problem, State
 from discs.solution import Solution
 from discs.step import suggest_dt
 
-LOOSE = 3e-4  # from here on "auto" takes the midpoint method
+USUAL = 1e-3  # the tolerance where none is given
+LEAST = 1e-12  # the least tolerance: some thousand times the rounding of a position
+LOOSE = 3e-4  # from here on "auto" begins with the midpoint method
 FEWEST = 20  # steps to begin with
-PROBES = 33  # frames that runs are compared at
+PROBES = 101  # frames that runs are compared at during the search, at most
 SAFETY = 2.0  # steps are not yet small when errors are large: found by experiment
+STALL = 0.7  # a change that falls by less than this has stalled
+GROWTH = 1.5, 4.0  # of the number of steps from run to run
+ENDED = 0.01  # |r'| of a disc a step before it loses its heading: the motion ends there; where it is larger, the step is too long
 ATTEMPTS = 20
+ROUNDED = 1e-12  # largest value of what is rounding only, in units of its scale
+
+RATES = ("omega", "phi_rate", "x_rate", "y_rate")
+DERIVED = (*RATES, "slope_x", "slope_y", "contact_force", "modified_energy")
+WANTED = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y"), "contact_force": ("contact_force",)}
+
+Run = Callable[[Problem, Integrator, float, NDArray], Solution]
 
 
-def method_for(method: str | Integrator, tol: float) -> Integrator:
-    """The integrator for a tolerance, its sweeps converged well below it; "auto" chooses."""
+def names(problem: Problem, want: Iterable[str] = ()) -> tuple[str, ...]:
+    """The quantities that a run records and a tolerance can bind."""
+    rows = problem.system.rows
+    turning = ("phi_rate",) if "phi" in rows else ()
+    return (*rows, "omega", *turning, *(name for key in want for name in WANTED.get(key, ())))
+
+
+def method_for(method: str | Integrator, tol: float, stalled: int = 0) -> Integrator:
+    """The integrator for a tolerance, its sweeps converged well below it; "auto" chooses, and goes on where one has `stalled`."""
     if method == "auto":
-        return Midpoint(tolerance=1e-2 * tol) if tol >= LOOSE else Gauss6(tolerance=max(1e-3 * tol, 1e-13))
+        if tol >= LOOSE and not stalled:
+            return Midpoint(tolerance=min(1e-2 * tol, 1e-4))
+        return (Gauss8 if stalled + (tol < LOOSE) > 1 else Gauss6)(tolerance=_swept(min(tol, LOOSE)))
     integrator = find(method)
     if isinstance(method, str) and isinstance(integrator, Midpoint | Gauss):
-        return replace(integrator, tolerance=max(1e-3 * tol, 1e-13))
+        return replace(integrator, tolerance=_swept(tol))
     if isinstance(method, str) and isinstance(integrator, Composition):
-        return replace(integrator, base=Midpoint(tolerance=max(1e-3 * tol, 1e-13)))
+        return replace(integrator, base=Midpoint(tolerance=_swept(tol)))
     if integrator.adaptive:
         raise ValueError(f"{integrator.name} has tolerances of its own: {type(integrator).__name__}(rtol=..., atol=...)")
     return integrator
 
 
+def _swept(tol: float) -> float:
+    return max(1e-3 * tol, 1e-13)
+
+
 def to_tolerance(
     problem: Problem,
     method: str | Integrator,
-    tol: float,
+    tol: float | Mapping[str, float],
     times: NDArray,
-    run: Callable[[Integrator, float, NDArray], Solution],
+    run: Run,
+    want: Iterable[str] = (),
 ) -> Solution:
-    """Run with smaller and smaller steps until the last change says that positions and angles are within `tol`.
+    """Run with smaller and smaller steps until the last change says that the tolerance is kept.
 
     Errors of two runs, steps h and h/r, are taken to be as 1 to r^-2 even for methods of higher order, whose order stiff modes
-    reduce: the error of the finer is then the change over r^2 - 1; twice that is the estimate.
+    reduce: the error of the finer is then the change over r^2 - 1; twice that is the estimate. Velocities, slopes and forces may
+    carry waves that no step resolves yet and whose errors do not fall at all: their estimate is the whole change, if that is
+    larger. The energy is known: its error is what it changed by.
+
+    "auto" goes on with a method of higher order where the change stalls, twice in a row. The search fails where the change of two
+    runs is that of two runs that start one unit in the last place apart: then it is rounding, amplified by the motion.
 
     Parameters
     ----------
     problem, method : as `simulate` takes them.
-    tol : largest error of x, y, theta (and phi) over discs and frames, relative to the largest value of each.
+    tol : largest error over discs and frames, relative to the largest value: of x, y, theta (and phi), or of the quantities named.
     times : frames, (F,).
-    run : (integrator, dt, times) -> Solution.
+    run : (problem, integrator, dt, times) -> Solution.
+    want : what is recorded besides.
 
     Returns
     -------
-    Solution of the last run, with `error_estimate`; stats["attempts"] counts the runs.
+    Solution of the last run, with `error_estimate` of every quantity recorded, over all frames; stats["attempts"] counts the runs.
 
     Raises
     ------
-    SimulationError : if runs with smaller steps fail too, or the tolerance is not reached.
+    ValueError : for a tolerance below what doubles can reach, or of what is not recorded.
+    NotReached : if the tolerance is not reached.
+    SimulationError : if the motion ends before, or runs fail at every step.
     """
-    tol = checks.number("tol", tol, positive=True)
-    integrator = method_for(method, tol)
-    some = times if times.size <= PROBES else times[np.unique(np.linspace(0, times.size - 1, PROBES).round().astype(int))]
-    steps, last, failure, stalls, estimate = FEWEST, None, None, 0, np.inf
-    if np.isfinite(integrator.stability_limit):
-        steps = max(steps, int(np.ceil(times[-1] / suggest_dt(problem, integrator))))
     rows = problem.system.rows
+    bound = checks.tolerances(tol, names(problem, want), rows, LEAST)
+    sharpest = min(value if name in rows else 1e-2 * value for name, value in bound.items())  # sweeps are told by moves, not rates
+    integrator = method_for(method, sharpest)
+    if not times[-1]:
+        start = run(problem, integrator, problem.duration / FEWEST, times)
+        return _told(start, dict.fromkeys(_compared(start), 0.0), tol, 1)
+    some = some_of(times)
+    steps, stalled, stalls, worst = _fewest(problem, integrator, times[-1]), 0, 0, np.inf
+    last: Solution | None = None
+    failure: SimulationError | None = None
     for attempt in range(1, ATTEMPTS + 1):
         dt = times[-1] / steps
         try:
-            found = run(integrator, dt, some)
+            found = run(problem, integrator, dt, some)
+            failure = None
         except SimulationError as error:
-            if failure and error.message == failure.message and abs(error.time - failure.time) < 0.02 * failure.time:
-                raise  # shorter steps end there too
-            found, failure = None, error
-        if found is None or found.stats["unconverged"]:
+            if error.slope < ENDED:
+                raise
+            failure = error
+        if failure or found.stats["unconverged"]:
             steps, last = 2 * steps, None
             continue
         if last is not None:
-            ratio = ((last.stats["dt"] / dt) ** 2 - 1) / SAFETY
-            errors = {row: float(np.abs(getattr(found, row) - getattr(last, row)).max()) / ratio for row in rows}
-            before, estimate = estimate, max(errors[row] / (np.abs(getattr(found, row)).max() or 1.0) for row in rows)
-            stalls += estimate > 0.7 * before
-            if estimate <= tol:
-                if some.size < times.size:
-                    found = run(integrator, dt, times)
-                return replace(found, error_estimate=errors, stats=found.stats | {"tol": tol, "attempts": attempt})
+            errors = estimates(found, last)
+            before, worst = worst, _worst(found, errors, bound)
+            if worst <= 1 and some.size < times.size:
+                last, found = (run(problem, integrator, h, times) for h in (last.stats["dt"], dt))
+                errors = estimates(found, last)
+                worst = _worst(found, errors, bound)
+            if worst <= 1:
+                return _told(found, errors, tol, attempt)
+            stalls = stalls + 1 if worst > STALL * before else 0
+            if stalls >= 2:
+                if method == "auto" and method_for(method, sharpest, stalled + 1) != integrator:
+                    stalled, stalls, worst, last = stalled + 1, 0, np.inf, None
+                    integrator = method_for(method, sharpest, stalled)
+                    continue
+                floor = _worst(found, _differences(found, run(_nudged(problem), integrator, dt, found.t)), bound)
+                if floor > worst / 10:
+                    raise NotReached(_tight(bound), worst, dt, floor, _told(found, errors, tol, attempt))
         last = found
-        if stalls == 3:  # rounding, not the step, is what is left
-            break
-        growth = 2.0 if not np.isfinite(estimate) else float(np.clip(1.1 * (estimate / tol) ** 0.4, 1.3, 4.0))
+        growth = 2.0 if not np.isfinite(worst) else float(np.clip(1.1 * worst**0.4, *GROWTH))
         steps = int(np.ceil(growth * steps))
-    if failure and last is None:
-        raise failure
-    what = f"tol = {tol:g} was not reached: the error is estimated at {estimate:.1e} with dt = {dt:g}"
-    raise SimulationError(f"{what}; take a larger tol or another method", last.stats["steps"] if last else 0, times[-1], 0)
+    if last is None:
+        raise failure or SimulationError(f"steps do not converge, down to dt = {dt:g}; take another method", 0, 0.0, 0)
+    raise NotReached(_tight(bound), worst, dt, None, _told(found, errors, tol, ATTEMPTS))
+
+
+def some_of(times: NDArray) -> NDArray:
+    """The frames that the search looks at, of all."""
+    return times if times.size <= PROBES else times[np.linspace(0, times.size - 1, PROBES).round().astype(int)]
+
+
+class NotReached(SimulationError):
+    """A tolerance that was not reached.
+
+    Attributes
+    ----------
+    best : the last run, with its estimate.
+    """
+
+    def __init__(self, tol: float, worst: float, dt: float, floor: float | None, best: Solution) -> None:
+        what = f"tol = {tol:g} was not reached: the error is estimated at {tol * worst:.1e} with dt = {dt:g}"
+        if floor is None:
+            why = f"and {ATTEMPTS} runs with smaller and smaller steps were made; take a larger tol or another method"
+        else:
+            why = f"and runs that start one unit in the last place apart differ by {tol * floor:.1e}, so rounding is what is left; "
+            why += "take a larger tol, or end the run earlier"
+        super().__init__(f"{what}, {why}", best.stats["steps"], best.t[-1], 0)
+        self.best, self._given = best, (tol, worst, dt, floor, best)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), self._given
+
+
+def estimates(found: Solution, last: Solution) -> dict[str, float]:
+    """Errors of a run, largest over discs and frames, from one with longer steps; see `to_tolerance`."""
+    factor = SAFETY / ((last.stats["dt"] / found.stats["dt"]) ** 2 - 1)
+    change = _differences(found, last)
+    errors = {name: value * (max(factor, 1.0) if name in DERIVED else factor) for name, value in change.items()}
+    assert found.problem is not None
+    return errors | {"energy": float(np.abs(found.energy - found.problem.energy()).max())}
+
+
+def _compared(found: Solution) -> list[str]:
+    """Names of what a run records of its motion."""
+    assert found.problem is not None
+    recorded = (*found.problem.system.rows, *DERIVED, "energy")
+    return [name for name in recorded if getattr(found, name) is not None]
+
+
+def _differences(one: Solution, other: Solution) -> dict[str, float]:
+    return {name: float(np.abs(getattr(one, name) - getattr(other, name)).max()) for name in _compared(one)}
+
+
+def _worst(found: Solution, errors: dict[str, float], bound: dict[str, float]) -> float:
+    """The largest error in units of its tolerance."""
+    assert found.problem is not None
+    system = found.problem.system
+    scale = dict(zip(system.rows, system.scale, strict=True))
+
+    def size(name: str) -> float:
+        largest = float(np.abs(getattr(found, name)).max())
+        return largest if largest > ROUNDED * scale.get(name, 0.0) else scale.get(name, 1.0)
+
+    return max(errors[name] / (tol * size(name)) for name, tol in bound.items())
+
+
+def _told(found: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int) -> Solution:
+    """The run with what was found out about it."""
+    told = {"tol": dict(tol) if isinstance(tol, Mapping) else tol, "attempts": attempts}
+    return replace(found, error_estimate=errors, stats=found.stats | told)
+
+
+def _tight(bound: dict[str, float]) -> float:
+    return min(bound.values())
+
+
+def _fewest(problem: Problem, integrator: Integrator, end: float) -> int:
+    """Steps to begin with."""
+    if not np.isfinite(integrator.stability_limit):
+        return FEWEST
+    return max(FEWEST, int(np.ceil(end / suggest_dt(problem, integrator))))
+
+
+def _nudged(problem: Problem) -> Problem:
+    """The problem from positions and angles one unit in the last place away, to either side."""
+    start, rng = problem.initial, np.random.default_rng(0)
+
+    def nudge(value: NDArray) -> NDArray:
+        return np.nextafter(value, value + rng.choice((-1.0, 1.0), value.shape))
+
+    moved = {name: nudge(np.array(getattr(start, name))) for name in problem.system.rows}
+    rates = {"omega": start.omega, "phi_rate": start.phi_rate}
+    return Problem(problem.chain, State(**moved, **rates), problem.duration)

@@ -1,6 +1,8 @@
 """The integrators, by name."""
 
+import ast
 from functools import cache
+from typing import Any
 
 from discs import checks
 from discs.integrators.base import FixedStep, Integrator, OneStep, Work
@@ -30,6 +32,24 @@ def _standard(name: str) -> Integrator:
     return METHODS[name]()
 
 
+def from_settings(text: str) -> Integrator:
+    """The integrator that a run was made with, from its settings as `stats` tells them; ValueError if it is none."""
+
+    def build(node: ast.expr) -> Any:
+        known = {cls.__name__: cls for cls in METHODS.values()}
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known and not node.args:
+            return known[node.func.id](**{str(word.arg): build(word.value) for word in node.keywords})
+        return ast.literal_eval(node)
+
+    try:
+        found = build(ast.parse(text, mode="eval").body)
+    except (SyntaxError, TypeError, ValueError, RecursionError, MemoryError):
+        found = None
+    if not isinstance(found, Integrator):
+        raise ValueError(f"these are no settings of an integrator: {text[:80]!r}")
+    return found
+
+
 __all__ = [
     "BDF",
     "DOP853",
@@ -51,4 +71,5 @@ __all__ = [
     "Suzuki4",
     "Work",
     "find",
+    "from_settings",
 ]

@@ -46,12 +46,14 @@ class Frame(NamedTuple):
     """Positions q = hi + lo and their rates of change, all (rows, n).
 
     lost : a disc that a compiled step on the way saw losing its heading, or -1; then the rest means nothing.
+    seen : q, energy and largest slip, where the compiled form found them on the way.
     """
 
     hi: NDArray
     lo: NDArray
     rate: NDArray
     lost: int = -1
+    seen: tuple[NDArray, float, float] | None = None
 
 
 class Integrator(ABC):
@@ -103,6 +105,11 @@ class Integrator(ABC):
     def recall(self, memory: Any, kept: dict[str, Any]) -> Any:
         """The memory that was kept; `memory` is that of `begin`, of the same run."""
 
+    def finer(self, system: RollingDiscs, memory: Any, h: float, chain: Any = None) -> NDArray | None:
+        """Positions (rows, n) one step h later, of an error several times smaller, for `discs.trust`; None: steps are checked as
+        they are taken."""
+        return None
+
     def extras(self, system: RollingDiscs, memory: Any, h: float) -> dict[str, float]:
         """The quantities in `offers`, at the last step."""
         return {}
@@ -152,16 +159,25 @@ class OneStep(FixedStep):
         if chain is None:
             z = self.step(system, memory, tau, work) if tau else memory
             return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
-        from discs.kernels import methods
+        import discs.kernels.methods as methods
 
         z, lost = memory, -1
         if tau:
             z, tally = self.march(chain, memory, tau, 1, np.inf)
             work.add(tally)
             lost = tally.lost
-        rate = np.empty_like(z.hi)
-        methods.rates(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), rate)
-        return Frame(z.hi, z.lo, rate, lost)
+        rate, q = np.empty_like(z.hi), np.empty_like(z.hi)
+        energy, slip = methods.look(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), rate, q)
+        return Frame(z.hi, z.lo, rate, lost, (q, energy, slip))
+
+    @final
+    def finer(self, system: RollingDiscs, memory: Phase, h: float, chain: Any = None) -> NDArray:
+        if chain is not None:
+            hi, pi = memory.hi.copy(), memory.pi.reshape(-1, memory.hi.shape[1]).copy()
+            self.kernel(chain, hi, memory.lo.copy(), pi, 0.5 * h, 2, np.inf)
+            return hi
+        work = Work()
+        return self.step(system, self.step(system, memory, 0.5 * h, work), 0.5 * h, work).hi
 
     @final
     def keep(self, memory: Phase) -> dict[str, Any]:

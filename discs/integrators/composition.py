@@ -43,7 +43,7 @@ class Composition(OneStep, ABC):
         return z
 
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        from discs.kernels import methods
+        import discs.kernels.methods as methods
 
         fractions = np.array(self.fractions)
         return methods.compose(chain, hi, lo, pi, fractions, h, steps, self.base.sweeps, float(self.base.tolerance), bound)

@@ -109,7 +109,7 @@ class Gauss(OneStep, ABC):
         return Phase(*add(z.hi, z.lo, h * _mix(b, v)), z.pi + _mix(last, p - z.pi))
 
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        from discs.kernels import collocation
+        import discs.kernels.collocation as collocation
 
         coefficients = tuple(tableau(self.stages))
         return collocation.gauss(chain, hi, lo, pi, coefficients, h, steps, self.sweeps, float(self.tolerance), bound)

@@ -40,7 +40,7 @@ class Reduced:
     def __call__(self, t: float, y: NDArray) -> NDArray:
         """The rate of y."""
         if self.chain is not None:
-            from discs.kernels import methods
+            import discs.kernels.methods as methods
 
             out = np.empty_like(y)
             methods.reduced(self.chain, np.ascontiguousarray(y), out)

@@ -59,7 +59,7 @@ class Leapfrog(FixedStep):
         return TwoStep(hi, lo, memory.next, system.forward(c, system.back(c, free)) - memory.next)
 
     def march(self, chain: Any, memory: TwoStep, h: float, steps: int, bound: float) -> tuple[TwoStep, Tally]:
-        from discs.kernels import methods
+        import discs.kernels.methods as methods
 
         after = TwoStep(*(array.copy() for array in memory))
         return after, Tally(*methods.leapfrog(chain, *after, h, steps, bound))
@@ -68,8 +68,15 @@ class Leapfrog(FixedStep):
         rate = (memory.last + memory.next) / (2 * h)
         if not tau:
             return Frame(memory.hi, memory.lo, rate)
+        return RK4().at(system, self._phase(system, memory, rate), tau, h, work, chain)
+
+    def finer(self, system: RollingDiscs, memory: TwoStep, h: float, chain: Any = None) -> NDArray:
+        rate = (memory.last + memory.next) / (2 * h)
+        return RK4().at(system, self._phase(system, memory, rate), h, h, Work(), chain).hi
+
+    def _phase(self, system: RollingDiscs, memory: TwoStep, rate: NDArray) -> Phase:
         pi = system.back(system.frame(system.shape(memory.hi, memory.lo)), system.weights * rate)
-        return RK4().at(system, Phase(memory.hi, memory.lo, pi), tau, h, work, chain)
+        return Phase(memory.hi, memory.lo, pi)
 
     def kinetic(self, system: RollingDiscs, memory: TwoStep, h: float) -> float:
         return system.kinetic(memory.next / h)

@@ -76,6 +76,6 @@ class Midpoint(OneStep):
         return Phase(*add(z.hi, z.lo, 2 * move), 2 * p - z.pi)
 
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        from discs.kernels import methods
+        import discs.kernels.methods as methods
 
         return methods.compose(chain, hi, lo, pi, WHOLE, h, steps, self.sweeps, float(self.tolerance), bound)

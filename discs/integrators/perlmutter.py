@@ -60,6 +60,6 @@ class McLachlanPerlmutter(OneStep):
         return Phase(*add(z.hi, z.lo, move), pi)
 
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        from discs.kernels import methods
+        import discs.kernels.methods as methods
 
         return methods.perlmutter(chain, hi, lo, pi, h, steps, self.sweeps, float(self.tolerance), bound)

@@ -38,6 +38,6 @@ class RK4(OneStep):
         return Phase(*add(z.hi, z.lo, dq), z.pi + dpi)
 
     def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        from discs.kernels import methods
+        import discs.kernels.methods as methods
 
         return methods.rk4(chain, hi, lo, pi, h, steps, bound)

@@ -9,7 +9,7 @@ moves of leapfrog are its velocity). Where the discs are means nothing then: the
 import numpy as np
 
 from discs.kernels import chain as do
-from discs.kernels.compiled import kernel
+from discs.kernels.compiled import kernel, part
 from discs.kernels.shared import add, ahead, back, copy, forward, kinetic, largest, renew
 
 
@@ -186,21 +186,9 @@ def perlmutter(chain, hi, lo, pi, h, steps, sweeps, tolerance, bound):
     return steps, steps, 0, unconverged, lost
 
 
-@kernel
-def rates(chain, hi, lo, pi, v):
-    """v = C pi at hi + lo."""
-    work, c = do.workspace(chain), np.empty_like(hi)
-    do.settle(chain, work, hi, lo)
-    do.frame(chain, work, np.zeros_like(hi), c)
-    forward(c, pi, v)
-
-
-@kernel
-def observe(chain, hi, lo, v, q):
-    """q = hi + lo; returns the energy and the largest slip |r. - e omega| at rates v."""
-    work, c = do.workspace(chain), np.empty_like(hi)
-    do.settle(chain, work, hi, lo)
-    do.frame(chain, work, np.zeros_like(hi), c)
+@part
+def seen(chain, work, c, hi, lo, v, q):
+    """q = hi + lo, which the work is settled at; returns the energy and the largest slip |r. - e omega| at rates v."""
     energy, slip = do.potential(chain, work), 0.0
     for row in range(hi.shape[0]):
         for i in range(hi.shape[1]):
@@ -210,6 +198,25 @@ def observe(chain, hi, lo, v, q):
         x, y = v[0, i] - c[0, i] / c[2, i] * v[2, i], v[1, i] - c[1, i] / c[2, i] * v[2, i]
         slip = max(slip, np.sqrt(x * x + y * y))
     return energy, slip
+
+
+@kernel
+def look(chain, hi, lo, pi, v, q):
+    """v = C pi at hi + lo, and what `seen` returns."""
+    work, c = do.workspace(chain), np.empty_like(hi)
+    do.settle(chain, work, hi, lo)
+    do.frame(chain, work, np.zeros_like(hi), c)
+    forward(c, pi, v)
+    return seen(chain, work, c, hi, lo, v, q)
+
+
+@kernel
+def observe(chain, hi, lo, v, q):
+    """What `seen` returns at hi + lo and rates v."""
+    work, c = do.workspace(chain), np.empty_like(hi)
+    do.settle(chain, work, hi, lo)
+    do.frame(chain, work, np.zeros_like(hi), c)
+    return seen(chain, work, c, hi, lo, v, q)
 
 
 @kernel

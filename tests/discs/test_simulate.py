@@ -8,10 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from continuum import breathing_ring, untwisting_rod
+from compare import lump
+from compare.hard_problems import rough
+from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.mesh import semidiscretise
 from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, Suzuki4, simulate, suggest_dt
+from discs.command_line import summary
 from discs.integrators import METHODS
+from discs.simulation import steps_before
 from discs.twist import untwisting_chain
 from tests.conftest import Model, models, uneven
 
@@ -153,7 +157,8 @@ def test_rest_stays_at_rest():
 
 
 def test_fewer_sweeps_are_counted():
-    run = simulate(uneven(9, Model("springs", "field")), Midpoint(sweeps=2, tolerance=1e-15), 0.05, frames=1, progress=False)
+    with pytest.warns(UserWarning, match=r"midpoint: 20 of 20 steps did not converge: the run may not be trusted"):
+        run = simulate(uneven(9, Model("springs", "field")), Midpoint(sweeps=2, tolerance=1e-15), 0.05, frames=1, progress=False)
     assert run.stats["steps"] == 20
     assert run.stats["solves"] == 40
     assert run.stats["unconverged"] == 20
@@ -191,6 +196,7 @@ def test_bad_chains_are_refused(change, message):
         ({"method": "euler"}, "method must be one of 'midpoint', 'suzuki4', .*'RK45', .*; got 'euler'"),
         ({"dt": 0.0}, "dt must be a positive finite number; got 0.0"),
         ({"dt": -0.1}, "dt must be a positive"),
+        ({"dt": 10.0}, "dt must be at most the duration, 1; got 10"),
         ({"dt": np.nan}, "dt must be a positive"),
         ({"frames": 0}, "frames must be a whole number of at least 1"),
         ({"frames": [0.5, 0.2]}, "increasing times within"),
@@ -276,12 +282,13 @@ def test_two_steered_discs():
 
 
 def test_the_last_part_of_a_step_is_watched_too():
-    """A step longer than the run: the one frame is reached by a shorter step, which blows up."""
+    """A step longer than the way to the one frame: that is reached by a shorter step, which blows up."""
     problem = semidiscretise(untwisting_rod(), 17, "springs")
     for name in ("rk4", "leapfrog"):
         with pytest.raises(SimulationError, match="blew up"):
-            simulate(problem, name, 100.0, frames=1, progress=False)
-    run = simulate(problem, "midpoint", 100.0, frames=1, progress=False)
+            simulate(problem, name, 4.5, frames=[4.4], progress=False)
+    with pytest.warns(UserWarning, match="dt = 4.5 is too long for this motion"):
+        run = simulate(problem, "midpoint", 4.5, frames=[4.4], progress=False)
     assert run.stats["steps"] == 0
     assert run.stats["solves"] > 0
 
@@ -325,3 +332,54 @@ def test_lost_energy_is_said():
     with pytest.warns(UserWarning, match=r"leapfrog: energy is conserved, but at t = .* the run may not be trusted"):
         simulate(problem, "leapfrog", progress=False)
     simulate(problem, "midpoint", dt=0.1, progress=False)
+
+
+TOO_LONG = [
+    (lump(untwisting_rod(twist=2.0), n=65, ends="consistent"), {"method": "midpoint"}, r"38 of 100 steps did not converge"),
+    (lump(untwisting_rod(), 33), {"dt": 4.5}, r"did not converge; dt = 4.5 is too long for this motion.*altogether.*take dt = "),
+    (lump(rolling_rod(omega=100.0, duration=1.0, amplitude=1e-2), 33), {"dt": 0.05}, "did not converge.*off altogether"),
+    (untwisting_chain(4097, duration=4.0), {"dt": 1.0}, r"did not converge.*off altogether"),
+    (rough(65, 4.5), {"method": "midpoint"}, "dt = 0.045 is too long for this motion.*off altogether"),
+    (lump(untwisting_rod(duration=9.0), 65), {"method": "leapfrog"}, "energy is conserved.*too long for this motion"),
+]
+
+
+@pytest.mark.parametrize(("problem", "settled", "message"), TOO_LONG, ids=["twist", "one", "rolling", "many", "rough", "leapfrog"])
+def test_a_step_that_is_too_long_is_said(problem, settled, message):
+    with pytest.warns(UserWarning, match=message) as heard:
+        run = simulate(problem, **settled, progress=False)
+    assert len(heard) == 1
+    assert heard[0].filename == __file__
+    assert "may not be trusted" in str(heard[0].message)
+    for told in (repr(run), summary(run)):
+        assert "did not converge" in told or "too long" in told
+
+
+def test_a_step_that_converges_is_named():
+    """With the step that `stats` names all steps converge."""
+    problem = lump(untwisting_rod(twist=2.0), n=65, ends="consistent")
+    with pytest.warns(UserWarning, match=r"steps did not converge.*take dt = 0\.00"):
+        run = simulate(problem, "midpoint", progress=False)
+    assert run.stats["converging_dt"] == run.stats["dt"] / 4
+    finer = simulate(problem, "midpoint", run.stats["converging_dt"], progress=False)
+    assert finer.stats["unconverged"] == 0
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_the_error_of_steps_is_that_of_the_run(name):
+    """Steps long enough for errors to show. (leapfrog's is nine times too large: the errors of its velocities do not add up.)"""
+    problem = uneven(7, Model("springs", "field"))
+    dt = {2: 0.02, 4: 0.1, 6: 0.2, 8: 0.25}[METHODS[name].order] if np.isinf(METHODS[name]().stability_limit) else None
+    run = simulate(problem, name, dt, progress=False)
+    exact = simulate(problem, "gauss8", 0.02, progress=False)
+    error = max(np.abs(getattr(run, q) - getattr(exact, q)).max() / np.abs(getattr(exact, q)).max() for q in ("x", "y", "theta"))
+    assert error / 5 < run.stats["step_error"] < 10 * error
+
+
+def test_whole_steps_are_counted_where_rounding_would_lose_one():
+    assert steps_before(0.3, 0.1) == (3, 0.0)  # 0.3/0.1 = 2.9999999999999996
+    assert steps_before(1e7, 0.1) == (100_000_000, 0.0)
+    steps, rest = steps_before(0.1 * 3_000_001, 0.1)
+    assert (steps, rest) == (3_000_001, 0.0)
+    assert steps_before(0.25, 0.1) == (2, pytest.approx(0.05))
+    assert steps_before(0.2 * (1 + 1e-11), 0.1) == (2, 0.0)  # rest below 1e-9 of a step

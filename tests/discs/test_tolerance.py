@@ -32,7 +32,7 @@ def test_the_true_error_is_within_the_tolerance(problem, tol):
     assert run.stats["method"] == ("midpoint" if tol >= 3e-4 else "gauss6")
     assert run.stats["attempts"] >= 2
     assert run.stats["dt"] > 0
-    assert set(run.error_estimate) == set(problem.system.rows)
+    assert set(run.error_estimate) >= {*problem.system.rows, "omega", "energy"}
     assert run.t.size == 12
 
 
@@ -70,8 +70,8 @@ def test_tolerances_that_are_none(tol, message):
 
 
 def test_what_cannot_be_reached_is_said():
-    with pytest.raises(SimulationError, match=r"tol = 1e-25 was not reached: the error is estimated at .* with dt ="):
-        simulate(uneven(5, Model("springs", "field")), "gauss6", tol=1e-25, frames=1, progress=False)
+    with pytest.raises(ValueError, match="tol must be at least 1e-12"):
+        simulate(uneven(5, Model("springs", "field")), tol=1e-300, progress=False)
     with pytest.raises(SimulationError, match="lost its heading"):
         simulate(lump(breathing_ring("unit", duration=4.0, omega=0.4), 24), "auto", frames=1, progress=False)
 

@@ -1,0 +1,108 @@
+r"""How far a run of fixed steps may be trusted: the error of its steps, and steps that did not converge.
+
+A step of size h and two of h/2 from the same state differ by the error of the step, up to a factor 1 - 2^-p near one. On a few of
+the run's N steps, spread over it, the step that was taken is compared so; the trajectory is not touched. Errors of smooth motions
+add up: N times the mean difference, relative to the largest value of each of x, y, theta (and phi), doubled, is the estimate
+`step_error`. It was within a factor of three of the error of most runs that it was measured on (docs/choosing.md): larger where
+the errors of waves do not add up, smaller where the motion amplifies differences.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.integrators.base import FixedStep, Work
+from discs.system import Phase, RollingDiscs
+
+EVERY = 50  # steps, of which one is compared
+MOST = 8  # steps compared in a run
+SAFETY = 2.0
+WARNED = 0.05  # of the largest position or angle: a run is warned of
+AIM = 1e-3  # relative error that a warning suggests a step for
+HALVINGS = 8  # of a step that did not converge, in search of one that does
+
+
+class Watch:
+    """The error of a run's steps, on some of them.
+
+    Parameters
+    ----------
+    steps : how many the run takes.
+
+    Attributes
+    ----------
+    due : the next step to compare, counted from 0.
+    total : (rows,), sum of the largest differences over the discs. size : (rows,), largest positions and angles seen.
+    count : steps compared.
+    """
+
+    def __init__(self, steps: int) -> None:
+        self.steps, self.apart = steps, steps / (MOST if steps > MOST * EVERY else 1 + steps // EVERY)
+        self.total: Any = 0.0
+        self.size: Any = 0.0
+        self.count, self.due = 0, int(0.5 * self.apart)
+
+    def compare(self, one: NDArray, two: NDArray) -> None:
+        """Count in a step: positions (rows, n) by one step and by two halves."""
+        size, off = np.maximum.reduce(np.abs(two), 1), np.maximum.reduce(np.abs(one - two), 1)
+        self.size, self.total = (np.maximum(self.size, size), self.total + off) if self.count else (size, off)
+        self.count += 1
+        self.due = int((self.count + 0.5) * self.apart)
+
+    def error(self) -> float:
+        """The estimate `step_error`; 0 if no step was compared."""
+        if not self.count:
+            return 0.0
+        worst = 0.0
+        for off, size in zip(self.total.tolist(), self.size.tolist(), strict=True):
+            if off > worst * (size or 1.0):
+                worst = off / (size or 1.0)
+        return SAFETY * (self.steps or 1) / self.count * worst
+
+
+def converging(system: RollingDiscs, integrator: FixedStep, before: Phase, steps: int, h: float, kernel: object) -> float:
+    """A step with which the first of `steps` steps that does not converge, from a state, would; h/2^HALVINGS if none was found."""
+
+    def stuck(z: Phase, tau: float, count: int) -> tuple[Phase, bool]:
+        if kernel is not None:
+            z, tally = integrator.march(kernel, z, tau, count, np.inf)
+            return z, tally.unconverged > 0
+        work = Work()
+        for _ in range(count):
+            z = integrator.advance(system, z, tau, work)
+        return z, work.unconverged > 0
+
+    for _ in range(steps):
+        after, bad = stuck(before, h, 1)
+        if bad:
+            break
+        before = after
+    for halving in range(1, HALVINGS + 1):
+        if not stuck(before, h / 2**halving, 2**halving)[1]:
+            break
+    return h / 2**halving
+
+
+def doubts(stats: dict[str, Any]) -> list[str]:
+    """Why a run is not to be trusted, in words, from what it tells of itself."""
+    found = []
+    if stuck := _number(stats, "unconverged"):
+        steps = _number(stats, "steps") + _number(stats, "short_steps")
+        found.append(f"{stuck} of {steps} steps did not converge")
+    if (error := _number(stats, "step_error")) > WARNED:
+        off = f"by about {100 * error:.0f} %" if error < 1 else "altogether"
+        found.append(f"dt = {_number(stats, 'dt'):.3g} is too long for this motion, positions or angles may be off {off}")
+    return found
+
+
+def cure(stats: dict[str, Any]) -> str:
+    """A step that might do, in words: with it the run's steps converge, and err by AIM if errors go like its square."""
+    shorter = stats["dt"] * np.sqrt(min(AIM / (stats.get("step_error") or AIM), 1.0))
+    return f"dt = {min(shorter, stats.get('converging_dt', np.inf)):.2g}"
+
+
+def _number(stats: dict[str, Any], name: str) -> float:
+    """What a run tells of itself, 0 where that is no number: a file may hold anything."""
+    value = stats.get(name)
+    return value if isinstance(value, int | float) else 0
