@@ -11,7 +11,7 @@ from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import Frame
 from discs.problem import Problem
 from discs.system import Phase, Placed, RollingDiscs
-from discs.trust import Watch, converging
+from discs.trust import SUSPECTED, Watch, converging
 from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which it is said
@@ -110,6 +110,8 @@ class March:
         """All that the run goes on from, as arrays and numbers by name."""
         work = {f"work.{name}": value for name, value in vars(self.work).items()}
         seen = {f"watch.{name}": getattr(self.watch, name) for name in WATCHED} if self.watch else {}
+        if self.watch and self.watch.places:
+            seen["watch.places"] = np.array(self.watch.places)
         return {"step": self.step} | work | seen | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
 
     def recall(self, kept: dict[str, Any]) -> None:
@@ -121,6 +123,8 @@ class March:
             for name in WATCHED:
                 value = kept[f"watch.{name}"]
                 setattr(self.watch, name, value if value.ndim else value.item())
+            if "watch.places" in kept:
+                self.watch.places = list(kept["watch.places"])
         of_memory = {name.removeprefix("memory."): value for name, value in kept.items() if name.startswith("memory.")}
         self.memory = self.integrator.recall(self.memory, of_memory)
 
@@ -141,12 +145,21 @@ class March:
             self.step += taken
             yield taken
 
-    def compare_short(self, tau: float) -> None:
-        """Show a run to the watch that is one step shorter than h."""
-        finer = self.integrator.finer(self.system, self.memory, tau, self.kernel)
-        if self.watch and finer is not None:
-            one = self.integrator.at(self.system, self.memory, tau, self.h, Work(), self.kernel)
-            self.watch.compare(one.hi, finer)
+    def step_error(self, rest: float) -> float:
+        """The estimate of the watch, at the end of a run that ends a time `rest` after its last step."""
+        watch, integrator = self.watch, self.integrator
+        if watch is None:
+            return 0.0
+        if rest and not watch.steps:
+            finer = integrator.finer(self.system, self.memory, rest, self.kernel)
+            one = integrator.at(self.system, self.memory, rest, self.h, Work(), self.kernel)
+            watch.compare(one.hi, one.hi if finer is None else finer)
+        found = watch.estimate()
+        if watch.short and SUSPECTED[0] < found < SUSPECTED[1] and not self.stuck and isinstance(integrator, FixedStep):
+            start = self.problem.start()
+            again = watch.again(self.system, start, integrator, self.memory.hi, self.h, self.kernel)
+            return found if again is None else again
+        return found
 
     def _remember(self, before: Any, steps: int, stuck: int) -> None:
         """Keep a state from which steps did not converge, whenever their number has doubled: the first and the last three."""

@@ -187,7 +187,7 @@ def _run(
     } | (more or {})
     record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about, estimate)
     steps, rest = steps_before(end, h)
-    watch = Watch(steps) if checked and not integrator.adaptive else None
+    watch = Watch(steps, system.n) if checked and not integrator.adaptive else None
     started = clock.perf_counter()
     with (
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),
@@ -211,9 +211,7 @@ def _run(
             short = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
             told |= {"short_steps": short} | march.remedy()
         if watch is not None:
-            if rest and not steps:
-                march.compare_short(rest)
-            told["step_error"] = watch.error()
+            told["step_error"] = march.step_error(rest)
         return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started})
 
 

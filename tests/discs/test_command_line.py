@@ -57,8 +57,10 @@ def test_tolerance_own_headings_and_overwrite(tmp_path, capsys):
     ]
     assert main(options) == 0
     assert "estimated error: x" in capsys.readouterr().out
-    assert main(options) == 2
-    assert "exists; give --overwrite to replace it" in capsys.readouterr().err
+    assert main(options) == 0  # read again
+    assert "estimated error: x" in capsys.readouterr().out
+    assert main([*options, "--tol", "1e-4"]) == 2
+    assert "holds another run, whose tol differs: 0.001 there, 0.0001 here" in capsys.readouterr().err
     assert main([*options, "--shear-stiffness", "7.5", "--overwrite"]) == 0
     assert load(path).problem.chain.shear_stiffness[0] == 7.5
     (tmp_path / "mine.nc").write_text("mine")

@@ -150,7 +150,7 @@ def test_sines_and_cosines():
 
 
 def test_true_curvature_has_the_plain_form_only():
-    run = simulate(uneven(7, ALL[-3]), dt=0.1, progress=False)
+    run = simulate(uneven(7, ALL[-3]), dt=0.05, progress=False)
     assert run.stats["engine"] == "plain"
 
 

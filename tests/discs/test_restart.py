@@ -125,6 +125,23 @@ def test_another_run_is_refused(settled, name, tmp_path):
     assert path.read_bytes() == before
 
 
+@pytest.mark.parametrize("settled", [{}, {"tol": 1e-5}, {"method": "suzuki4", "tol": 1e-4}], ids=["nothing", "tol", "method"])
+def test_a_run_to_a_tolerance_goes_on_with_the_step_that_was_found(settled, tmp_path, monkeypatch):
+    problem, path = uneven(7, OPEN), tmp_path / "run.nc"
+    settled = settled | {"frames": np.linspace(0.1, 0.9, 150)}
+    stopped(monkeypatch, 9, problem, **settled, checkpoint=path)
+    monkeypatch.setattr("discs.simulation.to_tolerance", None)  # no search
+    run = simulate(problem, **settled, checkpoint=path, progress=False)
+    equal(run, simulate(problem, **settled, checkpoint=path, progress=False))
+    monkeypatch.undo()
+    again = simulate(problem, **settled | {"frames": 5}, progress=False)
+    assert run.stats["tol"] == settled.get("tol", 1e-3)
+    assert run.stats["dt"] <= again.stats["dt"] * 1.5
+    assert set(run.error_estimate) >= {"x", "y", "theta", "omega", "energy"}
+    with pytest.raises(ValueError, match=r"holds another run, whose tol differs: .* there, 1e-06 here"):
+        simulate(problem, **settled | {"tol": 1e-6}, checkpoint=path, progress=False)
+
+
 def test_other_things_in_the_way(tmp_path, monkeypatch):
     problem = uneven(7, OPEN)
     (tmp_path / "text.nc").write_text("mine")
@@ -136,8 +153,6 @@ def test_other_things_in_the_way(tmp_path, monkeypatch):
         simulate(problem, **settled, checkpoint=tmp_path / "missing" / "run.nc")
     with pytest.raises(ValueError, match="it is a folder"):
         simulate(problem, **settled, checkpoint=tmp_path)
-    with pytest.raises(ValueError, match="a checkpoint keeps one run"):
-        simulate(problem, tol=1e-3, checkpoint=tmp_path / "run.nc")
     stopped(monkeypatch, 9, problem, **settled, checkpoint=tmp_path / "run.nc")
     good = (tmp_path / "run.nc.restart").read_bytes()
     locked = re.sub(rb"(PK\x01\x02....)..", lambda found: found[1] + b"\x01\x00", good, flags=re.DOTALL)  # a password is asked for
