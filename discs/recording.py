@@ -176,8 +176,11 @@ class Recording(Rows):
             raise ValueError(f"{self.path} {told}; give another path, or delete it")
 
 
-def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> tuple[Integrator, float] | None:
-    """Integrator and step of the run in a file, None if there is no file; ValueError if it was made for another tolerance."""
+def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> tuple[Integrator, float, dict[str, Any]] | None:
+    """Integrator and step of the run in a file, and what is known of its search, for `stats`; None if there is no file.
+
+    ValueError if it was made for another tolerance.
+    """
     if not Path(path).exists():
         return None
     with FrameFile.open(path) as file:
@@ -186,7 +189,8 @@ def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> 
         told = f": {stats.get('tol')} there, {tol} here"
         raise ValueError(f"{path} holds another run, whose tol differs{told}; give another path, or delete it")
     try:
-        return from_settings(str(stats["settings"])), checks.number("dt", stats["dt"], positive=True)
+        searched = {name: stats[name] for name in ("tol", "attempts") if name in stats}
+        return from_settings(str(stats["settings"])), checks.number("dt", stats["dt"], positive=True), searched
     except (KeyError, ValueError) as error:
         raise ValueError(f"{path} holds no run that can go on: {error}; give another path, or delete it") from None
 

@@ -117,7 +117,8 @@ def _search(
     times, doubt = frame_times(frames, problem.duration), ""
     kept = None if checkpoint is None else kept_settings(checkpoint, tol)
     if kept is not None:
-        return _run(problem, *kept, times, want, progress, engine, checkpoint, False), ""
+        integrator, dt, searched = kept
+        return _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched), ""
     looked_at = times if checkpoint is None else some_of(times)
     try:
         found = to_tolerance(problem, method, USUAL if tol is None else tol, looked_at, run, want)
@@ -127,9 +128,8 @@ def _search(
         found, doubt = error.best, f"{error.message}: this is the last run"
     if checkpoint is not None:
         integrator, dt = from_settings(found.stats["settings"]), found.stats["dt"]
-        more = {"tol": found.stats["tol"], "attempts": found.stats["attempts"]}
-        known = found.error_estimate
-        found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, more, known)
+        searched, known = {name: found.stats[name] for name in ("tol", "attempts")}, found.error_estimate
+        found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched, known)
     return found, doubt
 
 

@@ -145,14 +145,14 @@ def test_bad_solves_are_refused(arguments, message):
 def test_only_scenes_are_solved():
     with pytest.raises(ValueError, match=r"solve takes a Scene, .*; got Problem; simulate\(problem\) runs discs"):
         solve(semidiscretise(untwisting_rod(), 9, "springs"))
-    with pytest.raises(ValueError, match="solve takes a Scene, .*; got Rod"):
+    with pytest.raises(ValueError, match=r"solve takes a Scene, .*; got Rod"):
         solve(untwisting_rod().rod)
 
 
 @pytest.mark.parametrize("method", ["spectral", "richardson", "leapfrog"])
 def test_data_that_jump_are_refused_by_every_method(method):
     step = Scene(rod=Rod(**PAPER), duration=1.0, initial=lambda s: (s, 0 * s, 1.0 * (s > 2.13), 0 * s))
-    with pytest.raises(ValueError, match="initial theta jumps by 1 at s = 2.13"):
+    with pytest.raises(ValueError, match=r"initial theta jumps by 1 at s = 2\.13"):
         solve(step, 1e-2, method, progress=False)
 
 
