@@ -1,12 +1,14 @@
 """The functions that a field is made of: polynomials between free ends, Fourier series on a closed rod."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from continuum.density import Density
 from continuum.elements import lobatto
 
 FINER = 1.5  # points a node: products of three polynomials are integrated exactly
@@ -21,8 +23,9 @@ class Basis(NamedTuple):
     rates : (3 F, n), values at the nodes to the field and its two derivatives at the finer points.
     project : (n, F + n), f'' at the finer points and f at the nodes to the coefficients of P f.
     bending : (n,), int |r''|^2 is the sum of this times |coefficient|^2. torsion : (n, n), of int theta'^2.
-    fit : (n, n), r at the nodes to its coefficients.
-    line, field : places (S,) to matrices (S, n) that take coefficients, or values at the nodes, there.
+    line : places (S,) to the matrix (S, n) that takes coefficients there.
+    field : places (S,) and m = 0, 1, 2 to the matrix (S, n) that takes values at the nodes to the field's m-th derivatives there.
+    ends : how many of the first coefficients are r at the ends.
     """
 
     s: NDArray
@@ -32,9 +35,9 @@ class Basis(NamedTuple):
     project: NDArray
     bending: NDArray
     torsion: NDArray
-    fit: NDArray
     line: Callable[[NDArray], NDArray]
-    field: Callable[[NDArray], NDArray]
+    field: Callable[..., NDArray]
+    ends: int
 
 
 def smooth(order: NDArray) -> NDArray:
@@ -48,54 +51,74 @@ def smooth(order: NDArray) -> NDArray:
     return np.exp(-36.0 * order**16)
 
 
-def polynomials(n: int, length: float) -> Basis:
-    """Polynomials of degree n - 1 between free ends; coefficients of r are its values at the ends, then those of r'' by Legendre's
-    polynomials."""
-    half = length / 2
-    x, w, _ = lobatto(n - 1)
-    fine, wf = legendre.leggauss(int(np.ceil(FINER * n)))
-    second = np.eye(n - 2)  # columns are functions, by their Legendre coefficients
-    first, zeroth = legendre.legint(second, 1, lbnd=-1), legendre.legint(second, 2, lbnd=-1)
-    at_end = zeroth.sum(axis=0)  # every Legendre polynomial is one there
-    zeroth[:2] -= at_end / 2  # less the straight line 0 ... at_end
-    first[0] -= at_end / 2
-    to_legendre = np.linalg.inv(legendre.legvander(x, n - 1))
-    derivatives = [to_legendre, legendre.legder(to_legendre) / half, legendre.legder(to_legendre, 2) / half**2]
+@lru_cache(maxsize=16)
+def polynomials(n: int, density: Density) -> Basis:
+    """Polynomials of degree n - 1 in the density's coordinate xi, between free ends.
 
-    def value(points: NDArray, functions: NDArray) -> NDArray:
-        return legendre.legvander(points, len(functions) - 1) @ functions
+    Coefficients of r are its values at the ends, then those of r'' in polynomials in xi that are orthonormal in s. They are
+    integrated in s by Legendre series in xi: of degree n where s is linear in xi, which is exact, of many more where it is not.
+    """
+    length, modes = density.length, 3 * n + 300 if density.centres else n
+    points, weights = legendre.leggauss(modes + 1)
+    stretch = 1 / density.rate(density.place(points))[:, None]  # ds/dxi
+    series = (legendre.legvander(points, modes) * weights[:, None]).T * (np.arange(modes + 1) + 0.5)[:, None]
+    values = legendre.legvander(points, n - 3)
+    _, r = np.linalg.qr(values * np.sqrt(weights[:, None] * stretch))
+    second = np.linalg.inv(r) * np.sign(np.diag(r))  # columns are functions, by their Legendre coefficients
+    first = legendre.legint(series @ (values @ second * stretch), lbnd=-1)
+    zeroth = legendre.legint(series @ (legendre.legval(points, first).T * stretch), lbnd=-1)
+    tilt = (
+        legendre.legval(1.0, zeroth) - legendre.legval(-1.0, zeroth)
+    ) / length  # of the straight line that leaves no value at the ends
+    to_legendre = np.linalg.inv(legendre.legvander(lobatto(n - 1)[0], n - 1))
+    derivatives = [legendre.legder(to_legendre, m) for m in range(3)]
+
+    def value(xi: NDArray, functions: NDArray) -> NDArray:
+        return legendre.legvander(xi, len(functions) - 1) @ functions
 
     def line(s: NDArray) -> NDArray:
-        x = s / half - 1
-        return np.column_stack([(1 - x) / 2, (1 + x) / 2, half**2 * value(x, zeroth)])
+        return np.column_stack([1 - s / length, s / length, value(density.coordinate(s), zeroth) - np.outer(s, tilt)])
 
-    def slope(points: NDArray) -> NDArray:
-        ends = np.full(points.size, 1 / length)
-        return np.column_stack([-ends, ends, half * value(points, first)])
+    def slope(xi: NDArray) -> NDArray:
+        ends = np.full(xi.size, 1 / length)
+        return np.column_stack([-ends, ends, value(xi, first) - tilt])
 
+    def field(s: NDArray, m: int = 0) -> NDArray:
+        xi = density.coordinate(s)
+        found = value(xi, derivatives[m]) * density.rate(s)[:, None] ** m
+        return found if m < 2 else found + value(xi, derivatives[1]) * density.change(s)[:, None]
+
+    x, w, _ = lobatto(n - 1)
+    s = density.place(x)
+    fine, wf = legendre.leggauss(int(np.ceil(FINER * n)))
+    there = density.place(fine)
+    rate = density.rate(there)[:, None]
+    wf = wf / rate[:, 0]
+    bend = value(fine, second)
     none = np.zeros((fine.size, 2))
-    curved = np.hstack([none, value(fine, second)]), np.hstack([none, value(fine, legendre.legder(second)) / half])
-    norm = 2 / (2 * np.arange(n - 2) + 1)
+    curved = [np.hstack([none, bend]), np.hstack([none, value(fine, legendre.legder(second)) * rate])]
     project = np.zeros((n, fine.size + n))
     project[0, fine.size] = project[1, -1] = 1
-    project[2:, : fine.size] = (legendre.legvander(fine, n - 3) * wf[:, None]).T / norm[:, None]
-    twist = value(fine, derivatives[1])
+    project[2:, : fine.size] = (bend * wf[:, None]).T
+    rates = [field(there, m) for m in range(3)]
     return Basis(
-        s=half * (x + 1),
-        w=half * w,
+        s=s,
+        w=w / density.rate(s),
         bends=np.vstack([slope(x), slope(fine), *curved]) * smooth(np.concatenate([[0, 0], np.arange(n - 2) / (n - 3)])),
-        rates=np.vstack([value(fine, d) for d in derivatives]),
+        rates=np.vstack(rates),
         project=project,
-        bending=np.concatenate([[0, 0], half * norm]),
-        torsion=half * (twist.T * wf) @ twist,
-        fit=np.vstack([np.eye(n)[[0, -1]], derivatives[2]]),
+        bending=np.concatenate([[0, 0], np.ones(n - 2)]),
+        torsion=(rates[1].T * wf) @ rates[1],
         line=line,
-        field=lambda s: value(s / half - 1, to_legendre),
+        field=field,
+        ends=2,
     )
 
 
-def waves(n: int, length: float) -> Basis:
+@lru_cache(maxsize=16)
+def waves(n: int, density: Density) -> Basis:
     """The first n (odd) of 1, cos, sin, ... on a closed rod; coefficients of r are those of the series."""
+    length = density.length
     q = 2 * np.pi / length * np.repeat(np.arange(1, n // 2 + 1), 2)
     phase = np.tile([0.0, -np.pi / 2], n // 2)
     s, count = length / n * np.arange(n), int(np.ceil(FINER * n))
@@ -119,7 +142,7 @@ def waves(n: int, length: float) -> Basis:
         project=project,
         bending=np.concatenate([[0.0], q**4 * square]),
         torsion=length / count * twist.T @ twist,
-        fit=fit,
         line=value,
-        field=lambda s: value(s) @ fit,
+        field=lambda s, m=0: value(s, m) @ fit,
+        ends=0,
     )

@@ -16,69 +16,78 @@ projection of f'', and the two numbers that r'' does not know are the values of 
 is a skew-gradient system q. = C pi, pi. = - C^T grad V with V = int K |r''|^2/2 + beta theta'^2/2 quadratic, and Gauss methods
 keep its energy. Unknown are the coefficients of r'' and the ends, so nothing but omega is differentiated and no digits are
 lost. Integrals with e take 1.5 points a node, which is exact under the field law.
+
+Initial fields are projected, not read at the nodes, so that nothing between them is missed. With theta = theta_0(s) + vartheta the
+initial twist is only in V = int beta vartheta'^2/2 + K |r''|^2/2 + f . vartheta + const, by its moment about every function,
+
+    f_k = int beta theta_0' psi_k' = beta ([theta_0 psi_k'] - int theta_0 psi_k''),
+
+by a quadrature that resolves theta_0 (`continuum.initial`); no derivative of it is needed. vartheta is smoother than theta_0: a
+twist much narrower than the functions costs little accuracy where the rod rolls. r is fitted by least squares in s, omega at a node
+is the mean of the initial one with the node's function.
 """
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from continuum.bases import polynomials, waves
+from continuum.density import Density
+from continuum.initial import Resolved, resolve
 from continuum.rod import Scene
 from discs.system import Phase, SkewGradient
 
-NEAR = 1e-3  # a slope below which the unit law has lost its heading
+DATA = 24  # points of a piece of the initial fields, besides those for the functions
 
 
-class Frame:
+class Modes(NamedTuple):
+    """The eigenvectors of C^T (grad^2 V) C at a configuration: values (n,), vectors (n, n) in columns, back their transpose."""
+
+    values: NDArray
+    vectors: NDArray
+    back: NDArray
+
+
+class Frame(NamedTuple):
     """C at a configuration (or several, with one more axis before): e (n,) and t = 1/sqrt(w (alpha + rho |e|^2)) at the nodes; e'',
     2 e', e (3, F) at the finer points."""
 
-    def __init__(self, rod: "SpectralRod", e: NDArray, t: NDArray, finer: NDArray) -> None:
-        self.e, self.t, self.finer, self._rod = e, t, finer, rod
-        self._inverses: dict[complex, NDArray] = {}
-
-    @cached_property
-    def _stiffness(self) -> NDArray:
-        """C^T (grad^2 V) C, (n, n)."""
-        rod, n = self._rod, self.t.size
-        moves = np.zeros((self.finer.shape[1] + n, n), complex)
-        moves[:-n] = (self.finer[:, :, None] * rod.rates).sum(axis=0)
-        moves[-n:] = np.diag(self.e)
-        xy = (rod.basis.project @ moves.view(float)).reshape(n, n, 2)
-        bent = np.einsum("kic,k,kjc->ij", xy, rod.bending, xy, optimize=True)
-        return self.t[:, None] * (bent + rod.torsion) * self.t
-
-    def inverse(self, g: complex) -> NDArray:
-        """(I + g C^T (grad^2 V) C)^-1, kept for the next solve."""
-        if g not in self._inverses:
-            self._inverses[g] = np.linalg.inv(np.eye(self.t.size) + g * self._stiffness)
-        return self._inverses[g]
+    e: NDArray
+    t: NDArray
+    finer: NDArray
 
 
 class SpectralRod(SkewGradient):
     """The equations of motion of a scene on n functions.
 
-    Rows x, y of a configuration are coefficients of the `basis`, row theta is its values at the nodes.
+    Rows x, y of a configuration are coefficients of the `basis`, row theta is what is added to the initial theta, at the nodes.
+
+    Attributes
+    ----------
+    unit : whether rolling is by the unit law.
+    twist : (n,), the moment f of the initial twist.
+    start : the initial state.
     """
 
     rows = ("x", "y", "theta")
     quadratic = True
 
-    def __init__(self, scene: Scene, n: int) -> None:
+    def __init__(self, scene: Scene, n: int, density: Density | None = None) -> None:
         rod = scene.rod
-        self.n, self._unit, self._radius = n, scene.rolling == "unit", rod.radius
-        self.basis = (waves if scene.closed else polynomials)(n, rod.length)
+        self.n, self.unit, self._radius, self._scene = n, scene.rolling == "unit", rod.radius, scene
+        self.basis = (waves if scene.closed else polynomials)(n, density or Density(rod.length))
         self.scale = np.array([rod.length, rod.length, 1.0])
         self.bending, self.torsion = rod.bending_stiffness * self.basis.bending, rod.torsion_stiffness * self.basis.torsion
-        self.rates = self.basis.rates.reshape(3, -1, n)
         self._rates, self._bends, self._project = (
             np.ascontiguousarray(matrix.T) for matrix in (self.basis.rates, self.basis.bends, self.basis.project)
         )
         self._mass, self._spin = self.basis.w * rod.density, self.basis.w * rod.spin_inertia
         self._shift = complex(*scene.shift) / rod.length  # of a closed rod's line; z is the slope of the rest plus this
-        self.near = NEAR if self._unit else -1.0
+        self.twist, self._offset = np.zeros(n), 0.0
+        self.start = self._start(resolve(scene))
 
     @cached_property
     def kernel(self) -> Any:
@@ -93,50 +102,65 @@ class SpectralRod(SkewGradient):
             pull=np.ascontiguousarray(self.basis.project),
             bending=self.bending,
             torsion=self.torsion,
+            twist=self.twist,
             mass=self._mass,
             spin=self._spin,
             scale=self.scale,
             shift=self._shift,
             radius=float(self._radius),
-            near=self.near,
-            unit=self._unit,
+            unit=self.unit,
         )
 
-    def start(self, scene: Scene) -> Phase:
-        """The initial state."""
-        s = self.basis.s
-        fields = scene.fields(s)
-        a = self.basis.fit @ (fields["x"] + 1j * fields["y"] - self._shift * s)
-        q = np.array([a.real, a.imag, fields["theta"]])
-        return Phase(q, np.zeros_like(q), fields["omega"] / self.frame(q).t)
+    @cached_property
+    def line(self) -> NDArray:
+        """Coefficients of r to its values at the nodes, (n, n)."""
+        return self.basis.line(self.basis.s)
 
-    def slopes(self, z: Phase, h: float = 0.0) -> NDArray:
-        """|r'| at the nodes, (n,); the least of it on the straight way that their velocities lead in a time h."""
-        q, bends = z.hi + z.lo, self.basis.bends[: self.n].T
-        x, y = q[:2] @ bends
-        now = x + self._shift.real + 1j * (y + self._shift.imag)
-        if not h:
-            return np.abs(now)
-        x, y = h * self.forward(self.frame(q), z.pi)[:2] @ bends
-        move = x + 1j * y
-        return np.abs(now + move * np.clip(-(now.conj() * move).real / np.maximum(np.abs(move) ** 2, 1e-300), 0.0, 1.0))
+    def _start(self, initial: Resolved) -> Phase:
+        """The initial state; sets the twist, and the offset of V that makes the energy at the start that of the initial fields."""
+        scene, basis = self._scene, self.basis
+        s, w = initial.quadrature(DATA + self.n // 2)
+        fields, ends = scene.fields(s), np.array([0.0, scene.rod.length])
+        at_ends = scene.fields(ends)
+        moment = basis.field(ends, 1).T @ (np.array([-1, 1]) * at_ends["theta"]) - basis.field(s, 2).T @ (w * fields["theta"])
+        self.twist = scene.rod.torsion_stiffness * moment
+        a = np.zeros(self.n, complex)
+        if basis.ends:
+            a[: basis.ends] = at_ends["x"] + 1j * at_ends["y"]
+        root, line = np.sqrt(w), basis.line(s)
+        rest = fields["x"] + 1j * fields["y"] - self._shift * s - line[:, : basis.ends] @ a[: basis.ends]
+        a[basis.ends :] = np.linalg.lstsq(root[:, None] * line[:, basis.ends :], root * rest, rcond=None)[0]
+        q = np.array([a.real, a.imag, np.zeros(self.n)])
+        omega = basis.field(s).T @ (w * fields["omega"]) / basis.w
+        start = Phase(q, np.zeros_like(q), omega / self.frame(q).t)
+        self._offset = initial.energy - self.energy(start)
+        return start
+
+    def slopes(self, z: Phase) -> NDArray:
+        """r' at the nodes, (n,), as a complex number."""
+        x, y = (z.hi + z.lo)[:2] @ self.basis.bends[: self.n].T
+        return x + 1j * y + self._shift
 
     def energy(self, z: Phase) -> float:
         """Kinetic and potential energy."""
         return 0.5 * float(z.pi @ z.pi) + self.potential(z.hi + z.lo)
 
-    def at(self, z: Phase, s: NDArray) -> dict[str, NDArray]:
-        """x, y, theta, omega at places s (S,), each (S,)."""
-        q = z.hi + z.lo
-        line, field = self.basis.line(s), self.basis.field(s)
-        x, y = line @ q[0] + self._shift.real * s, line @ q[1] + self._shift.imag * s
-        return {"x": x, "y": y, "theta": field @ q[2], "omega": field @ (self.frame(q).t * z.pi)}
+    def reader(self, s: NDArray) -> Callable[[Phase], dict[str, NDArray]]:
+        """A function of states that returns x, y, theta, omega at places s (S,), each (S,)."""
+        line, field, theta = self.basis.line(s), self.basis.field(s), self._scene.fields(s)["theta"]
+
+        def at(z: Phase) -> dict[str, NDArray]:
+            q = z.hi + z.lo
+            x, y = line @ q[0] + self._shift.real * s, line @ q[1] + self._shift.imag * s
+            return {"x": x, "y": y, "theta": theta + field @ q[2], "omega": field @ (self.frame(q).t * z.pi)}
+
+        return at
 
     def slip(self, z: Phase) -> float:
         """Largest |r. - e omega| at the nodes: what the projection leaves of the constraint."""
         c = self.frame(z.hi + z.lo)
         rates = self.forward(c, z.pi)
-        return float(np.abs(self.basis.line(self.basis.s) @ (rates[0] + 1j * rates[1]) - c.e * rates[2]).max())
+        return float(np.abs(self.line @ (rates[0] + 1j * rates[1]) - c.e * rates[2]).max())
 
     def shape(self, hi: NDArray, lo: NDArray | None = None) -> NDArray:
         return hi if lo is None else hi + lo
@@ -151,7 +175,7 @@ class SpectralRod(SkewGradient):
         z = xy[..., 0, :] + 1j * xy[..., 1, :]
         n, f = self.n, self.basis.project.shape[1] - self.n
         at, slope, bend, bent = z[..., :n] + self._shift, z[..., n : n + f] + self._shift, z[..., n + f : -f], z[..., -f:]
-        if self._unit:  # z/|z| = exp(i phi) with phi' = Im(z'/z)
+        if self.unit:  # z/|z| = exp(i phi) with phi' = Im(z'/z)
             e, finer = at / np.abs(at), slope / np.abs(slope)
             log = bend / slope
             rate, turning = 1j * log.imag, 1j * (bent / slope - log * log).imag
@@ -160,7 +184,7 @@ class SpectralRod(SkewGradient):
             e, fine = at, np.stack([bent, 2 * bend, slope], axis=-2)
         e = 1j * self._radius * e
         t = 1 / np.sqrt(self._spin + self._mass * (e.real**2 + e.imag**2))
-        return Frame(self, e, t, 1j * self._radius * fine)
+        return Frame(e, t, 1j * self._radius * fine)
 
     def forward(self, c: Frame, p: NDArray) -> NDArray:
         omega = c.t * p
@@ -187,15 +211,27 @@ class SpectralRod(SkewGradient):
         return self.back(frames, self.mean_force(shape + moves))
 
     def potential(self, shape: NDArray) -> float:
-        return 0.5 * float(np.vdot(shape, self.mean_force(shape)))
+        return 0.5 * float(np.vdot(shape, self.mean_force(shape)) + self.twist @ shape[2]) + self._offset
 
     def secant(self, shape: NDArray, dq: NDArray) -> NDArray:
         return shape + 0.5 * dq
 
     def mean_force(self, secant: NDArray) -> NDArray:
         out = secant * self.bending
-        out[..., 2, :] = secant[..., 2, :] @ self.torsion
+        out[..., 2, :] = secant[..., 2, :] @ self.torsion + self.twist
         return out
 
+    def modes(self, c: Frame) -> Modes:
+        """The eigenvectors of C^T (grad^2 V) C: with them (I + g C^T (grad^2 V) C)^-1 takes two products for any g."""
+        n, points = self.n, c.finer.shape[1]
+        moves = np.zeros((n, points + n), complex)  # e psi of every function
+        moves[:, :points] = (c.finer * self.basis.rates.reshape(3, points, n).transpose(2, 0, 1)).sum(axis=1)
+        moves[:, points:] = np.diag(c.e)
+        xy = np.hstack([moves.real @ self._project, moves.imag @ self._project]).reshape(n, 2, n)
+        bent = (xy * self.bending).reshape(n, 2 * n) @ xy.reshape(n, 2 * n).T
+        values, vectors = np.linalg.eigh(c.t[:, None] * (bent + self.torsion) * c.t)
+        return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
+
     def solve(self, secant: NDArray, c: Frame, g: complex, rhs: NDArray) -> NDArray:
-        return c.inverse(g) @ rhs
+        values, vectors, back = self.modes(c)
+        return vectors @ ((back @ rhs) / (1 + g * values))

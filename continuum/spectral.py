@@ -1,148 +1,98 @@
-"""Fields of slaved headings to a tolerance, by Galerkin's method (`continuum.galerkin`) with ever more functions and steps.
+"""Fields of slaved headings to a tolerance, by Galerkin's method (`continuum.galerkin`) with ever more functions and shorter steps.
 
-The error of m_j functions is measured, not extrapolated: it is what m_{j+1} functions change, which err several times less. The
-coarser field is the solution, the finer one only its measure. Functions are added in long steps; when that changes less than half
-of the tolerance the steps of "gauss8" are halved until half as long ones change less than a quarter, and the functions are measured
-again: long steps hide high waves. The rest of the tolerance is for the errors of the finer ones. (The corner s = 0, t = 0, where
-the initial twist breaks a condition of the ends, leaves waves of wave number q and size q^-6 or less in theta: an error does not
-fall exponentially in the end, and how fast it falls cannot be told from the falls before.)
+The error is measured, not extrapolated: a motion on m_j functions is compared with one on m_{j+1} functions, and each measures the
+one before. The tolerance of steps (`continuum.stepping`) falls for the first three, so that one difference shows the errors of
+functions and of steps; then it stays, and errors of steps are measured by a motion of their own. Where a difference is more than a
+third of the last one, shorter steps on the same functions show which of the two is to blame; if it is the steps, their tolerance
+falls again and the functions go back by a size.
+
+The finer motion errs too. With a ratio p of its error to that of the coarser one the difference d is (1 - p) times the error, so
+the estimate is d/(1 - p): p from the last two differences, at least 1/3, and 1/2 where there is only one. (The corner s = 0, t = 0,
+where the initial twist breaks a condition of the ends, leaves waves of wave number q and size q^-6 or less in theta: errors fall
+like a power in the end, of the steps like their third.)
 """
 
 from collections.abc import Mapping
-from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from continuum.bounds import FIELDS, missed, over
+from continuum.density import Density
 from continuum.galerkin import SpectralRod
+from continuum.initial import resolve
 from continuum.rod import Scene
-from discs import Gauss8, SimulationError, Solution
-from discs.integrators.base import Work
-from discs.integrators.gauss import tableau
-from discs.simulation import steps_before
-from discs.system import Phase
+from continuum.stepping import Steps, TooFast, coarser, finer, sweeps
+from discs import SimulationError, Solution
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259)  # functions; odd, as a series has one more cosine than sines
-FEWEST = 16
-MOST_STEPS = FEWEST * 2**10
-NODES = 1025  # of a solution, so many that splines through them do for derivatives too
-POSITIONS = FIELDS[:3]
+NODES = 1025  # of a solution, so many that splines through them do for derivatives too; more where initial fields are narrow
+MOST_NODES = 8192
+FIRST_FACTOR = 2.0
+MORE = (3e-4, 3e-6, 3e-8)  # tolerances below which the search begins one size further
+FIRST = 0.5  # of the tolerance: that of a step in the first motion
+FAR = 100.0  # times the tolerance: errors above that are not yet for shorter steps to mend
+SLOW = 1 / 3  # of the last error: one above that falls slowly
+LEAST, UNKNOWN, MOST = 1 / 3, 0.5, 0.8  # what a finer motion errs by, over the error of the coarser one
+SAME = 0.05  # of the time: two motions that end so near to each other end there
 BENT = 1e-3  # curvature times the length at a free end, from which on a line is said to start bent there
 
 
+class Motion(NamedTuple):
+    """A motion on n functions.
+
+    fields : (F, S) by name, with energy and slip (F,).
+    start : largest error of the fields at the start, (S,), by name.
+    tolerance : of a step. steps : their number.
+    """
+
+    fields: dict[str, Any]
+    start: dict[str, float]
+    n: int
+    tolerance: float
+    steps: int
+
+
 class Course:
-    """Runs of a scene on n functions with a number of steps, kept for comparison.
+    """Motions of a scene on n functions.
 
     Parameters
     ----------
     times : (F,), when fields are compared and given.
-    tolerance : of the sweeps of a step.
-    compiled : whether steps are taken by `continuum.kernels`, or one by one by their plain twin.
+    compiled : whether steps are taken by `continuum.kernels`, or by their plain twin.
     """
 
-    def __init__(self, scene: Scene, times: NDArray, tolerance: float, bar: tqdm, compiled: bool = True) -> None:
-        self._scene, self._times, self._bar, self._compiled = scene, times, bar, compiled
-        self.tolerance, self._method = tolerance, Gauss8(tolerance=tolerance)
-        length = scene.rod.length
-        self.s = np.linspace(0, length, NODES) if not scene.closed else length / (NODES - 1) * np.arange(NODES - 1)
-        self._found: dict[tuple[int, int], dict[str, Any]] = {}
-        self.hint = bent_hint(scene)
+    def __init__(self, scene: Scene, times: NDArray, compiled: bool = True) -> None:
+        self._scene, self._times, self._compiled = scene, times, compiled
+        initial, length = resolve(scene), scene.rod.length
+        narrowest = min((width for _, width in initial.features), default=length)
+        nodes = NODES - 1
+        while nodes < MOST_NODES and length / nodes > narrowest / 4:
+            nodes *= 2
+        self.s = length / nodes * np.arange(nodes + (not scene.closed))
+        self._density = Density.of(initial)
+        self._first = scene.duration / 16  # step to begin with
 
-    def run(self, n: int, steps: int) -> dict[str, Any]:
-        """Fields (F, S), energy and slip (F,); SimulationError if the motion cannot go on, or not with these steps."""
-        if (n, steps) not in self._found:
-            self._bar.set_postfix(functions=n, steps=steps, refresh=False)
-            self._bar.update()
-            self._found[n, steps] = self._run(n, steps)
-        return self._found[n, steps]
-
-    def _run(self, n: int, steps: int) -> dict[str, Any]:
-        rod = SpectralRod(self._scene, n)
-        h, z = self._scene.duration / steps, rod.start(self._scene)
-        bound = 10 * rod.energy(z)
+    def run(self, n: int, tolerance: float) -> Motion:
+        rod = SpectralRod(self._scene, n, self._density)
+        steps = Steps(rod, self._scene.duration, tolerance, self._first, self._compiled)
+        at, initial = rod.reader(self.s), self._scene.fields(self.s)
+        begun = at(rod.start)
         rows: dict[str, list] = {}
-        done = 0
-        for time in self._times.tolist():
-            last, rest = steps_before(time, h)
-            while done < last:
-                z, taken = self._march(rod, z, h, last - done, bound)
-                done += taken
-                self._check(rod, z, taken, done, h)
-            shown = z
-            if rest:
-                shown, taken = self._march(rod, z, rest, 1, bound)
-                self._check(rod, shown, taken, done, h)
-            found = rod.at(shown, self.s) | {"energy": rod.energy(shown), "rolling_residual": rod.slip(shown)}
-            for name, value in found.items():
+        for z in steps.at(self._times):
+            for name, value in (at(z) | {"energy": rod.energy(z), "rolling_residual": rod.slip(z)}).items():
                 rows.setdefault(name, []).append(value)
-        return {name: np.array(values) for name, values in rows.items()}
-
-    def _march(self, rod: SpectralRod, z: Phase, h: float, steps: int, bound: float) -> tuple[Phase, int]:
-        """At most so many steps from z, to the last that converges or the first that loses a heading; and how many they are."""
-        if not self._compiled:
-            work = Work()
-            after = self._method.step(rod, z, h, work)
-            return (z, 0) if work.unconverged or not rod.energy(after) <= bound else (after, 1)
-        from continuum.kernels.collocation import gauss
-
-        z = Phase(z.hi.copy(), z.lo.copy(), z.pi.copy())
-        method, coefficients = self._method, tuple(tableau(self._method.stages))
-        return z, gauss(rod.kernel, z.hi, z.lo, z.pi[None], coefficients, h, steps, method.sweeps, method.tolerance, bound)[0]
-
-    def _check(self, rod: SpectralRod, z: Phase, taken: int, step: int, h: float) -> None:
-        """Stop where |r'| vanishes under the unit law (or where a step that does not converge leads), or no step was taken."""
-        slopes = rod.slopes(z, 0.0 if taken else h)
-        node = int(np.argmin(slopes))
-        if not slopes[node] > rod.near:
-            raise SimulationError(
-                "the rod lost its heading: r' = 0, and rolling='unit' has no direction there", step, step * h, node
-            )
-        if not taken:
-            raise SimulationError(f"steps do not converge: the motion is too fast for them{self.hint}", step, step * h, node)
-
-    def effect(self, n: int, steps: int) -> dict[str, float]:
-        """Of the steps on n functions: what twice as many change."""
-        return distances(self.run(n, steps), self.run(n, 2 * steps))
+        if steps.lengths:
+            self._first = steps.lengths[0]
+        start = {name: float(np.abs(begun[name] - initial[name]).max()) for name in FIELDS}
+        return Motion({name: np.array(values) for name, values in rows.items()}, start, n, tolerance, len(steps.lengths))
 
 
 def distances(a: dict[str, NDArray], b: dict[str, NDArray]) -> dict[str, float]:
     """Largest difference of each field."""
     return {name: float(np.abs(a[name] - b[name]).max()) for name in FIELDS}
-
-
-def possible_steps(course: Course, sizes: tuple[int, ...], steps: int) -> int:
-    """So many steps, or twice, four times, ... as many, that the motion can be followed on these numbers of functions."""
-    last = None
-    while steps <= MOST_STEPS:
-        try:
-            for n in sizes:
-                course.run(n, steps)
-            return steps
-        except SimulationError as error:
-            if last and error.message == last.message and abs(error.time - last.time) < 0.02 * last.time:
-                raise  # twice as many steps end there too
-            last = error
-        steps *= 2
-    raise _too_fast(course)
-
-
-def enough_steps(course: Course, n: int, steps: int, bound: Mapping[str, float]) -> int:
-    """So many steps, or twice, four times, ... as many, that their effect on n functions is below a quarter of the bounds."""
-    while steps <= MOST_STEPS:
-        if over(course.effect(n, steps), bound) <= 1 / 4:
-            return steps
-        steps *= 2
-    raise _too_fast(course)
-
-
-def _too_fast(course: Course) -> ValueError:
-    return ValueError(
-        f"tol is not reached in {MOST_STEPS} time steps: the motion is too sensitive or too fast; "
-        f"ask for a larger tol or a shorter duration{course.hint}"
-    )
 
 
 def bent_hint(scene: Scene) -> str:
@@ -162,27 +112,96 @@ def bent_hint(scene: Scene) -> str:
     return "; the line starts bent at a free end, which may be why: the end has no curvature and sends out ever shorter waves"
 
 
+class Search:
+    """The search for functions and steps that reach a tolerance.
+
+    Parameters
+    ----------
+    bound : largest errors wanted, by field.
+
+    Attributes
+    ----------
+    course : what runs motions.
+    estimate : of the errors of the last motion that was measured, by field.
+    """
+
+    def __init__(self, scene: Scene, bound: Mapping[str, float], times: NDArray, bar: tqdm) -> None:
+        self.course, self._bound, self._bar = Course(scene, times), bound, bar
+        self.estimate = dict.fromkeys(FIELDS, np.inf)
+        self._change = np.inf  # of the last two motions, over its bound
+
+    def result(self) -> Motion:
+        """A motion within the bounds."""
+        tol = min(self._bound.values())
+        start = sum(tol < below for below in MORE)
+        sizes = SIZES[min(start, len(SIZES) - 2) :]
+        tolerance, finest = FIRST * tol, finer(finer(FIRST * tol))
+        last, failure, blameless = None, None, 0.0
+        for n, fewer in zip(sizes, (sizes[0], *sizes), strict=False):
+            try:
+                found = self._run(n, tolerance)
+                if last is not None:
+                    before = self._change
+                    if self._reached(last, found):
+                        return last
+                    if SLOW * before < self._change < FAR and blameless < SLOW * self._change:
+                        shorter = self._run(n, found.tolerance / float(np.clip(2 * self._change, 4.0, 30.0)))
+                        by_steps = over(distances(found.fields, shorter.fields), self._bound)
+                        if by_steps > SLOW * self._change:  # shorter steps then, and functions as before
+                            last, found = self._run(fewer, coarser(shorter.tolerance)), shorter
+                            if self._reached(last, found):
+                                return last
+                            tolerance, finest = shorter.tolerance, finer(shorter.tolerance)
+            except SimulationError as error:
+                if failure and error.message == failure.message and abs(error.time - failure.time) <= SAME * failure.time:
+                    raise
+                failure, last, self._change = error, None, np.inf
+                continue
+            last, tolerance = found, max(finer(tolerance), finest)
+        if failure:
+            raise failure
+        raise ValueError(missed(self.estimate, self._bound, f"on {sizes[-1]} functions"))
+
+    def _run(self, n: int, tolerance: float) -> Motion:
+        self._bar.set_postfix(functions=n, refresh=False)
+        self._bar.update()
+        return self.course.run(n, tolerance)
+
+    def _reached(self, coarse: Motion, fine: Motion) -> bool:
+        """Whether the coarser motion is within the bounds."""
+        change = distances(coarse.fields, fine.fields)
+        before, self._change = self._change, over(change, self._bound)
+        ratio = float(np.clip(self._change / before, LEAST, MOST)) if np.isfinite(before) else UNKNOWN
+        self.estimate = {name: max(error / (1 - ratio), coarse.start[name]) for name, error in change.items()}
+        if over(self.estimate, self._bound) > 1:
+            return False
+        if fine.tolerance >= coarse.tolerance:  # both err alike by their steps
+            shorter = self._run(coarse.n, finer(coarse.tolerance))
+            by_steps = distances(coarse.fields, shorter.fields)
+            self.estimate = {name: error + by_steps[name] / (1 - LEAST) for name, error in self.estimate.items()}
+        return over(self.estimate, self._bound) <= 1
+
+
 def solve_spectral(scene: Scene, bound: Mapping[str, float], times: NDArray, progress: bool) -> Solution:
     """The fields of a scene with slaved headings at `times` (F,), within the bounds by name; see `continuum.solve`."""
-    tol = min(bound.values())
     with (
-        tqdm(desc=f"field to {tol:g}", unit="run", delay=1, disable=not progress) as bar,
+        tqdm(desc=f"field to {min(bound.values()):g}", unit="run", delay=1, disable=not progress) as bar,
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),
     ):
-        course = Course(scene, times, min(1e-8, 1e-3 * tol), bar)
-        steps = FEWEST
-        for n, more in pairwise(SIZES):
-            steps = possible_steps(course, (n, more), steps)
-            space = distances(course.run(n, steps), course.run(more, steps))
-            if over(space, bound) <= 1 / 2:
-                steps = enough_steps(course, n, steps, bound)
-                space = distances(course.run(n, steps), course.run(more, steps))
-            if over(space, bound) > 1 / 2:
-                continue
-            time, found = course.effect(n, steps), course.run(n, steps)
-            unit = {"x": scene.rod.length, "y": scene.rod.length}
-            rest = {name: course.tolerance * unit.get(name, 1.0) for name in FIELDS}  # of the sweeps
-            estimate = {name: space[name] + time[name] + rest[name] for name in FIELDS}
-            stats = {"method": "spectral", "order": None, "functions": n, "dt": scene.duration / steps, "steps": steps}
-            return Solution(t=times, s=course.s, error_estimate=estimate, stats=stats, **found)
-    raise ValueError(missed(space, bound, f"on {n} functions") + course.hint)
+        search = Search(scene, bound, times, bar)
+        try:
+            found = search.result()
+        except TooFast as error:
+            raise SimulationError(error.message + bent_hint(scene), error.step, error.time, error.disc) from None
+        except ValueError as error:
+            raise ValueError(f"{error}{bent_hint(scene)}") from None
+    rounded = {"x": scene.rod.length, "y": scene.rod.length}
+    estimate = {name: error + sweeps(found.tolerance) * rounded.get(name, 1.0) for name, error in search.estimate.items()}
+    stats = {
+        "method": "spectral",
+        "order": None,
+        "functions": found.n,
+        "dt": scene.duration / max(found.steps, 1),
+        "steps": found.steps,
+    }
+    return Solution(t=times, s=search.course.s, error_estimate=estimate, stats=stats, **found.fields)

@@ -1,10 +1,10 @@
-"""Gauss collocation of a rod on n functions in compiled form; the plain twin is `discs.integrators.gauss`."""
+"""A Gauss step of a rod on n functions in compiled form; the plain twin is `continuum.collocation`."""
 
 import numpy as np
 
-from continuum.kernels.spectral import blank, energy, force, forward, frame, part, settle, stiffness
+from continuum.kernels.spectral import blank, force, forward, frame, part, settle
 from discs.kernels.compiled import kernel
-from discs.kernels.shared import add, copy
+from discs.kernels.shared import add
 
 
 @part
@@ -23,30 +23,27 @@ def mixed(base, weights, parts, h, out):
 
 
 @part
-def factor(stiff, g, matrix):
-    """matrix = (I + g C^T (grad^2 V) C)^-1, complex."""
-    n = len(stiff)
-    for i in range(n):
+def correct(modes, h, pairs, into, out, rest, parts, modal, change):
+    """change = the solution for `rest` (s, n) along the eigenvectors of the tableau and their conjugates, with frozen modes."""
+    s, n = rest.shape
+    for j in range(pairs.size):
         for k in range(n):
-            matrix[i, k] = g * stiff[i, k]
-        matrix[i, i] += 1
-    found = np.linalg.inv(matrix)
-    for i in range(n):  # assigning the whole would take as long to compile as all the rest
+            x = 0j
+            for i in range(s):
+                x += into[j, i] * rest[i, k]
+            parts[2 * j, k], parts[2 * j + 1, k] = x.real, x.imag
+    np.dot(parts, modes.vectors, modal)
+    for j in range(pairs.size):
+        g = h * h * pairs[j] * pairs[j]
         for k in range(n):
-            matrix[i, k] = found[i, k]
-
-
-@part
-def correct(inverse, into, out, rest, x, y, change):
-    """Add to `change` the solution for `rest` (s, n) along one eigenvector of the tableau and its conjugate."""
-    for k in range(x.size):
-        x[k] = 0.0
-        for i in range(len(rest)):
-            x[k] += into[i] * rest[i, k]
-    np.dot(inverse, x, y)
-    for i in range(len(rest)):
-        for k in range(x.size):
-            change[i, k] += (out[i] * y[k]).real
+            y = complex(modal[2 * j, k], modal[2 * j + 1, k]) / (1 + g * modes.values[k])
+            modal[2 * j, k], modal[2 * j + 1, k] = y.real, y.imag
+    np.dot(modal, modes.back, parts)
+    for i in range(s):
+        for k in range(n):
+            change[i, k] = 0.0
+            for j in range(pairs.size):
+                change[i, k] += out[j, i].real * parts[2 * j, k] - out[j, i].imag * parts[2 * j + 1, k]
 
 
 @part
@@ -60,75 +57,129 @@ def within(moves, h, scale):
     return True
 
 
-@kernel
-def gauss(rod, hi, lo, pi, tableau, h, steps, sweeps, tolerance, bound):
-    """Steps from hi + lo (3, n) and pi (1, n), in place; the tableau, `discs.integrators.gauss`, has an even number of stages.
+@part
+def dot(a, b):
+    """Sum of the products of two arrays (s, 3, n)."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        for row in range(3):
+            x, y = a[i, row], b[i, row]
+            for k in range(x.size):
+                total += x[k] * y[k]
+    return total
 
-    Returns (taken, sweeps). Stops before a step that does not converge or whose energy is not below `bound`, and after one in which
-    |r'| is not above `rod.near`.
+
+@part
+def combine(x, factors, out):
+    """out += sum_j factors[j] x[j]; x (3, s, rows, n), out (s, rows, n)."""
+    for j in range(3):
+        for i in range(out.shape[0]):
+            for row in range(out.shape[1]):
+                to, y = out[i, row], x[j, i, row]
+                for k in range(to.size):
+                    to[k] += factors[j] * y[k]
+
+
+@part
+def remember(count, x, history):
+    """Put x (s, rows, n) into history (3, s, rows, n), in place of the oldest."""
+    to = history[count % 3]
+    for i in range(x.shape[0]):
+        for row in range(x.shape[1]):
+            for k in range(x.shape[2]):
+                to[i, row, k] = x[i, row, k]
+
+
+@part
+def mixing(count, residuals, factors):
+    """Anderson's mixing of depth 2: factors (3,) of sum one with which the last residuals (3, s, 3, n) add up to the least."""
+    for j in range(3):
+        factors[j] = 0.0
+    now, before, first = count % 3, (count - 1) % 3, (count - 2) % 3
+    factors[now] = 1.0
+    if count == 0:
+        return
+    f = residuals[now]
+    ff, fg, gg = dot(f, f), dot(f, residuals[before]), dot(residuals[before], residuals[before])
+    a, u = ff - 2 * fg + gg, ff - fg  # with d = f - g: d.d and d.f
+    x, y = (u / a if a > 0 else 0.0), 0.0
+    if count > 1:
+        fh, gh, hh = dot(f, residuals[first]), dot(residuals[before], residuals[first]), dot(residuals[first], residuals[first])
+        b, c, w = ff - 2 * fh + hh, ff - fg - fh + gh, ff - fh
+        determinant = a * b - c * c
+        if determinant > 1e-12 * a * b:
+            x, y = (u * b - w * c) / determinant, (a * w - c * u) / determinant
+    factors[now], factors[before] = 1.0 - x - y, x
+    if count > 1:
+        factors[first] = y
+
+
+@kernel
+def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v):
+    """A step from hi + lo (3, n) and pi (n,), in place if it converges; the plain twin is `continuum.collocation.step`.
+
+    modes : `continuum.galerkin.Modes`, of a configuration not far away.
+    tableau : of `discs.integrators.gauss`, with an even number of stages s.
+    v : (s, 3, n), the rates of the stages, on return.
+
+    Returns the number of sweeps, 0 if they did not converge.
     """
     a, b, last, _, _, _, pairs, pairs_in, pairs_out = tableau
-    s, n = b.size, pi.shape[1]
+    s, n = b.size, pi.size
     stages, work = blank(rod, s)
-    common, single = blank(rod, 1)
-    base, middle, v1 = np.empty((1, 3, n)), np.empty((1, 3, n)), np.empty((1, 3, n))
-    q, v, moves = np.empty((s, 3, n)), np.empty((s, 3, n)), np.empty((s, 3, n))
-    p, pull, change, rest = np.empty((s, n)), np.empty((s, 1, n)), np.empty((s, n)), np.empty((s, 1, n))
-    stiff, inverse = np.empty((n, n)), np.empty((pairs.size, n, n), np.complex128)
-    x, y = np.empty(n, np.complex128), np.empty(n, np.complex128)
-    half, weights, scale = np.full((1, 1), 0.5), b.reshape(1, s), tolerance * rod.scale
-    before, total = (np.empty((3, n)), np.empty((3, n)), np.empty((1, n))), 0
+    base, v1, weights, scale = np.empty((1, 3, n)), np.empty((1, 3, n)), b.reshape(1, s), tolerance * rod.scale
+    q, moves = np.empty((s, 3, n)), np.empty((s, 3, n))
+    p, pull, change, rest = np.empty((s, 1, n)), np.empty((s, 1, n)), np.empty((s, n)), np.empty((s, 1, n))
+    parts, modal = np.empty((2 * pairs.size, n)), np.empty((2 * pairs.size, n))
+    rates, momenta, residuals, factors = np.zeros((3, s, 3, n)), np.zeros((3, s, 1, n)), np.zeros((3, s, 3, n)), np.zeros(3)
+    start, momentum = pi.reshape(1, 1, n), p.reshape(s, n)
     settle(hi, lo, base)
-    frame(rod, single, base, common)
-    for step in range(steps):
-        copy(hi, before[0])
-        copy(lo, before[1])
-        copy(pi, before[2])
-        forward(rod, single, common, pi, v1)
-        mixed(base, half, v1, h, middle)
-        frame(rod, single, middle, common)
-        stiffness(rod, common, stiff)
-        for j in range(pairs.size):
-            factor(stiff, h * h * pairs[j] ** 2, inverse[j])
+    for i in range(s):
+        for k in range(n):
+            p[i, 0, k] = pi[k]
+            for row in range(3):
+                q[i, row, k] = base[0, row, k]
+    frame(rod, work, q, stages)
+    forward(rod, work, stages, momentum, v)
+    for sweep in range(sweeps):
+        mixed(base, a, v, h, q)
+        frame(rod, work, q, stages)
+        for i in range(s):
+            for row in range(3):
+                for k in range(n):
+                    moves[i, row, k] = -v[i, row, k]
+        forward(rod, work, stages, momentum, v)
+        mixed(base, a, v, h, q)
+        force(rod, work, q, stages, pull)
+        mixed(start, a, pull, -h, rest)
         for i in range(s):
             for k in range(n):
-                p[i, k] = pi[0, k]
-        forward(rod, work, common, p, v)
-        sweep, settled = 0, False
-        while sweep < sweeps and not settled:
-            sweep += 1
-            mixed(base, a, v, h, q)
-            frame(rod, work, q, stages)
-            forward(rod, work, stages, p, v)
-            mixed(base, a, v, h, q)
-            force(rod, work, q, stages, pull)
-            mixed(pi.reshape(1, 1, n), a, pull, -h, rest)
-            for i in range(s):
+                rest[i, 0, k] -= p[i, 0, k]
+        correct(modes, h, pairs, pairs_in, pairs_out, rest.reshape(s, n), parts, modal, change)
+        for i in range(s):
+            for k in range(n):
+                p[i, 0, k] += change[i, k]
+        forward(rod, work, stages, momentum, v)
+        for i in range(s):
+            for row in range(3):
                 for k in range(n):
-                    rest[i, 0, k] -= p[i, k]
-                    change[i, k] = 0.0
-            for j in range(pairs.size):
-                correct(inverse[j], pairs_in[j], pairs_out[j], rest.reshape(s, n), x, y, change)
-            for i in range(s):
-                for k in range(n):
-                    p[i, k] += change[i, k]
-            forward(rod, work, stages, p, v)
-            forward(rod, work, common, change, moves)
-            settled = within(moves, 0.5 * h, scale)
-        total += sweep
-        mixed(np.zeros((1, 3, n)), weights, v, h, v1)
-        add(hi, lo, v1[0], 1.0)
-        for k in range(n):
-            start = pi[0, k]
-            for i in range(s):
-                pi[0, k] += last[i] * (p[i, k] - start)
-        settle(hi, lo, base)
-        least = frame(rod, single, base, common)
-        if (sweep == sweeps and tolerance > 0) or not energy(rod, base[0], pi[0]) <= bound:
-            copy(before[0], hi)
-            copy(before[1], lo)
-            copy(before[2], pi)
-            return step, total
-        if not least > rod.near:
-            return step + 1, total
-    return steps, total
+                    moves[i, row, k] += v[i, row, k]
+        if within(moves, 0.5 * h, scale):
+            mixed(np.zeros((1, 3, n)), weights, v, h, v1)
+            add(hi, lo, v1[0], 1.0)
+            for k in range(n):
+                before = pi[k]
+                for i in range(s):
+                    pi[k] += last[i] * (p[i, 0, k] - before)
+            return sweep + 1
+        remember(sweep, v, rates)
+        remember(sweep, p, momenta)
+        remember(sweep, moves, residuals)
+        mixing(sweep, residuals, factors)
+        for i in range(s):
+            for k in range(n):
+                p[i, 0, k] = 0.0
+                v[i, 0, k], v[i, 1, k], v[i, 2, k] = 0.0, 0.0, 0.0
+        combine(rates, factors, v)
+        combine(momenta, factors, p)
+    return 0

@@ -1,6 +1,6 @@
 """A rod on n functions in compiled form; the plain twin is `continuum.galerkin.SpectralRod`.
 
-Arrays have a row for each stage, `s` of them, F finer points. A frame C at one configuration can serve all stages.
+Arrays have a row for each stage, `s` of them, F finer points.
 """
 
 from typing import NamedTuple
@@ -20,7 +20,7 @@ class Spectral(NamedTuple):
     """Parameters. The matrices and weights are those of `continuum.bases.Basis`, for row vectors on their left.
 
     bends : (n, n + 3 F). rates : (n, 3 F), back : (3 F, n). project : (F + n, n), pull : (n, F + n). bending : (n,).
-    torsion : (n, n). mass, spin : (n,), w rho and w alpha. scale : (3,). near : |r'| from which on there is a heading.
+    torsion : (n, n). twist : (n,), moment of the initial twist. mass, spin : (n,), w rho and w alpha. scale : (3,).
     """
 
     bends: NDArray
@@ -30,12 +30,12 @@ class Spectral(NamedTuple):
     pull: NDArray
     bending: NDArray
     torsion: NDArray
+    twist: NDArray
     mass: NDArray
     spin: NDArray
     scale: NDArray
     shift: complex
     radius: float
-    near: float
     unit: bool
 
 
@@ -74,9 +74,9 @@ def blank(rod, s):
 
 @part
 def frame(rod, work, q, c):
-    """C at configurations q (s, 3, n); returns the least |r'|."""
+    """C at configurations q (s, 3, n)."""
     s, _, n = q.shape
-    points, least = c.finer.shape[2], np.inf
+    points = c.finer.shape[2]
     for i in range(s):
         for k in range(n):
             work.xy[2 * i, k], work.xy[2 * i + 1, k] = q[i, 0, k], q[i, 1, k]
@@ -86,7 +86,6 @@ def frame(rod, work, q, c):
         for k in range(n):
             e = complex(x[k], y[k]) + rod.shift
             length = np.sqrt(e.real * e.real + e.imag * e.imag)
-            least = min(least, length)
             e *= 1j * (rod.radius / length if rod.unit else rod.radius)
             c.e[i, k] = e
             c.t[i, k] = 1 / np.sqrt(rod.spin[k] + rod.mass[k] * (e.real * e.real + e.imag * e.imag))
@@ -103,7 +102,6 @@ def frame(rod, work, q, c):
                 bend, bent = 1j * rate * slope, complex(-rate * rate, turning) * slope
             ir = 1j * rod.radius
             c.finer[i, 0, f], c.finer[i, 1, f], c.finer[i, 2, f] = ir * bent, 2 * ir * bend, ir * slope
-    return least
 
 
 @part
@@ -121,13 +119,12 @@ def forward(rod, work, c, p, v):
     points = c.finer.shape[2]
     omega, moves = work.omega, work.moves
     for i in range(s):
-        t = c.t[min(i, c.t.shape[0] - 1)]
+        t = c.t[i]
         for k in range(n):
             omega[i, k] = t[k] * p[i, k]
     np.dot(omega, rod.rates, work.rates)
     for i in range(s):
-        one = min(i, c.t.shape[0] - 1)
-        e, finer, rates = c.e[one], c.finer[one], work.rates[i]
+        e, finer, rates = c.e[i], c.finer[i], work.rates[i]
         for f in range(points):
             move = finer[0, f] * rates[f] + finer[1, f] * rates[points + f] + finer[2, f] * rates[2 * points + f]
             moves[2 * i, f], moves[2 * i + 1, f] = move.real, move.imag
@@ -161,37 +158,5 @@ def force(rod, work, q, c, pull):
     for i in range(s):
         x, y, e = work.moves[2 * i], work.moves[2 * i + 1], c.e[i]
         for k in range(n):
-            p[i, k] += e[k].real * x[points + k] + e[k].imag * y[points + k] + work.xy[i, k]
+            p[i, k] += e[k].real * x[points + k] + e[k].imag * y[points + k] + work.xy[i, k] + rod.twist[k]
             p[i, k] *= c.t[i, k]
-
-
-@part
-def stiffness(rod, c, out):
-    """out = C^T (grad^2 V) C, (n, n), of one configuration."""
-    n, points = rod.bends.shape[0], c.finer.shape[2]
-    moves, weighed = np.zeros((2 * n, points + n)), np.empty((n, 2 * n))
-    for k in range(n):
-        for f in range(points):
-            move = c.finer[0, 0, f] * rod.rates[k, f] + c.finer[0, 1, f] * rod.rates[k, points + f]
-            move += c.finer[0, 2, f] * rod.rates[k, 2 * points + f]
-            moves[2 * k, f], moves[2 * k + 1, f] = move.real, move.imag
-        moves[2 * k, points + k], moves[2 * k + 1, points + k] = c.e[0, k].real, c.e[0, k].imag
-    xy = np.dot(moves, rod.project).reshape(n, 2 * n)
-    for k in range(n):
-        for j in range(n):
-            weighed[k, j], weighed[k, n + j] = xy[k, j] * rod.bending[j], xy[k, n + j] * rod.bending[j]
-    np.dot(weighed, xy.T, out)
-    for k in range(n):
-        for j in range(n):
-            out[k, j] = c.t[0, k] * (out[k, j] + rod.torsion[k, j]) * c.t[0, j]
-
-
-@part
-def energy(rod, q, pi):
-    """Kinetic and potential energy at q (3, n)."""
-    twice = 0.0
-    for k in range(pi.size):
-        twice += pi[k] * pi[k] + rod.bending[k] * (q[0, k] * q[0, k] + q[1, k] * q[1, k])
-        for j in range(pi.size):
-            twice += q[2, k] * rod.torsion[k, j] * q[2, j]
-    return 0.5 * twice

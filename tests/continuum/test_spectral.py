@@ -5,27 +5,30 @@ from functools import partial
 
 import numpy as np
 import pytest
-from tqdm import tqdm
 
-from continuum import Rod, Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
+from continuum import Rod, Scene, breathing_ring, collocation, exact, rolling_rod, solve, untwisting_rod
 from continuum.bases import polynomials, waves
+from continuum.density import Density
 from continuum.galerkin import SpectralRod
-from continuum.kernels.collocation import gauss
+from continuum.kernels.collocation import step as compiled_step
 from continuum.scenes import PAPER
-from continuum.spectral import Course, bent_hint
-from discs import Gauss6, Gauss8, SimulationError
+from continuum.spectral import bent_hint
+from discs import Gauss6, SimulationError
 from discs.integrators.base import Work
 from discs.integrators.gauss import tableau
+from discs.system import Phase
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
 POSITIONS = ("x", "y", "theta")
 
 
-@pytest.mark.parametrize("make", [polynomials, waves])
-def test_functions(make):
-    """Values, derivatives and integrals of a function that each basis holds exactly."""
-    n, length = 15, 3.0
-    basis, s = make(n, length), np.linspace(0, 2.9, 7)
+@pytest.mark.parametrize(
+    ("make", "centres", "n"), [(polynomials, (), 15), (waves, (), 15), (polynomials, ((1.1, 0.4, 2.0), (2.5, 0.3, 1.0)), 75)]
+)
+def test_functions(make, centres, n):
+    """Values, derivatives and integrals of a function that each basis holds, exactly but for the one in another coordinate."""
+    length = 3.0
+    basis, s = make(n, Density(length, centres)), np.linspace(0, 2.9, 7)
     q = 2 * np.pi / length
 
     def f(s, m):
@@ -35,30 +38,35 @@ def test_functions(make):
             np.polynomial.Polynomial([0.3, 1, -0.4, 0.2, 0.1]).deriv(m)(s) if m else 0.3 + s - 0.4 * s**2 + 0.2 * s**3 + 0.1 * s**4
         )
 
-    a = basis.fit @ f(basis.s, 0)
-    np.testing.assert_allclose(basis.line(s) @ a, f(s, 0), atol=1e-12)
-    np.testing.assert_allclose(basis.field(s) @ f(basis.s, 0), f(s, 0), atol=1e-12)
-    np.testing.assert_allclose(basis.bends[:n] @ a, f(basis.s, 1), atol=1e-11)
+    fine = np.linspace(0, length, 20001)
+    a = np.linalg.lstsq(basis.line(fine), f(fine, 0))[0]
+    atol = 1e-8 if centres else 1e-11
+    np.testing.assert_allclose(basis.line(s) @ a, f(s, 0), atol=atol)
+    for m in range(3):
+        np.testing.assert_allclose(basis.field(s, m) @ f(basis.s, 0), f(s, m), atol=(1e-12, 1e-10, 1e-6 if centres else 1e-8)[m])
+    np.testing.assert_allclose(basis.bends[:n] @ a, f(basis.s, 1), atol=atol)
     slope, bend, bent = (basis.bends[n:] @ a).reshape(3, -1)  # a has nothing of the highest functions
     value, rate, second = (basis.rates @ f(basis.s, 0)).reshape(3, -1)
-    np.testing.assert_allclose(slope, rate, atol=1e-11)
-    np.testing.assert_allclose(bend, second, atol=1e-10)
+    np.testing.assert_allclose(slope, rate, atol=10 * atol)
+    np.testing.assert_allclose(bend, second, atol=1e3 * atol)
     assert value.size == bent.size == basis.project.shape[1] - n
     moves = np.concatenate([second, f(basis.s, 0)])
-    np.testing.assert_allclose(basis.project @ moves, a, atol=1e-11)
-    fine = np.linspace(0, length, 20001)
+    np.testing.assert_allclose(basis.project @ moves, a, atol=1e3 * atol)
     assert basis.bending @ a**2 == pytest.approx(np.trapezoid(f(fine, 2) ** 2, fine), rel=1e-6)
     nodal = f(basis.s, 0)
     assert nodal @ basis.torsion @ nodal == pytest.approx(np.trapezoid(f(fine, 1) ** 2, fine), rel=1e-6)
     assert basis.w @ nodal == pytest.approx(np.trapezoid(f(fine, 0), fine), rel=1e-7)
+    assert len(basis.s) == n
+    np.testing.assert_allclose(Density(length, centres).place(Density(length, centres).coordinate(s)), s, atol=1e-14)
 
 
 def followed(scene, n, steps):
-    """The rod on n functions, and its state at the end, by compiled steps."""
+    """The rod on n functions, and its state at the end, by equal compiled steps of four stages with modes of their own."""
     rod = SpectralRod(scene, n)
-    z = rod.start(scene)
-    taken, _ = gauss(rod.kernel, z.hi, z.lo, z.pi[None], tuple(tableau(4)), scene.duration / steps, steps, 50, 1e-12, np.inf)
-    assert taken == steps
+    z = Phase(*(part.copy() for part in rod.start))
+    for _ in range(steps):
+        modes = rod.modes(rod.frame(z.hi + z.lo))
+        assert compiled_step(rod.kernel, *z, modes, tuple(tableau(4)), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)))
     return rod, z
 
 
@@ -78,7 +86,7 @@ def unit_scenes():
 def test_skew_gradient_and_energy(name, scene):
     """C^T is the transpose of C, several configurations at once are the same as one by one, and energy is constant."""
     rod = SpectralRod(scene, 21)
-    z = rod.start(scene)
+    z = rod.start
     rng = np.random.default_rng(4)
     q = z.hi + 0.01 * rng.standard_normal(z.hi.shape) / (1 + np.arange(21)) ** 4
     c, p, g = rod.frame(q), rng.standard_normal(21), rng.standard_normal((3, 21))
@@ -102,43 +110,19 @@ def test_skew_gradient_and_energy(name, scene):
 
 @pytest.mark.parametrize(("name", "scene"), [pytest.param(*pair, id=pair[0]) for pair in [*scenes(), *unit_scenes()]])
 def test_twins_agree(name, scene):
-    """Compiled steps and plain ones: converged, and after one sweep, where the matrix it solves with matters."""
-    rod, h = SpectralRod(scene, 21), scene.duration / 16
-    for method in (Gauss8(tolerance=1e-13), Gauss8(sweeps=1, tolerance=0)):
-        z, work = rod.start(scene), Work()
-        hi, lo, pi = z.hi.copy(), z.lo.copy(), z.pi[None].copy()
-        taken, sweeps = gauss(rod.kernel, hi, lo, pi, tuple(tableau(4)), h, 2, method.sweeps, method.tolerance, np.inf)
+    """Compiled steps and plain ones, of several numbers of stages: states, rates of the stages and sweeps."""
+    rod = SpectralRod(scene, 21)
+    modes = rod.modes(rod.frame(rod.start.hi))
+    for stages in (4, 6):
+        z = Phase(*(part.copy() for part in rod.start))
+        plain, v = rod.start, np.empty((stages, 3, 21))
         for _ in range(2):
-            z = method.step(rod, z, h, work)
-        assert taken == 2
-        assert abs(4 * sweeps - work.gradients) <= 4
-        np.testing.assert_allclose(hi + lo, z.hi + z.lo, atol=2e-11)
-        np.testing.assert_allclose(pi[0], z.pi, atol=1e-13)
-
-
-def test_both_engines_stop_where_the_other_does(rolling):
-    """Frames between steps, a step that does not converge, energy out of bounds, a heading that is lost."""
-    scene, times = untwisting_rod(rolling, **UNEVEN), np.array([0.0, 1.3, 4.5])
-    a, b = (Course(scene, times, 1e-10, tqdm(disable=True), compiled).run(15, 96) for compiled in (True, False))
-    for name, value in a.items():
-        np.testing.assert_allclose(value, b[name], atol=1e-9, err_msg=name)
-    for ends, match in [
-        (breathing_ring("unit", duration=1.2, radius=0.7), "lost its heading"),
-        (untwisting_rod(rolling, duration=400.0), "steps do not converge"),
-    ]:
-        said = []
-        for compiled in (True, False):
-            with pytest.raises(SimulationError, match=match) as caught, np.errstate(all="ignore"):
-                Course(ends, ends.duration * np.ones(1), 1e-8, tqdm(disable=True), compiled).run(15, 40)
-            said.append(str(caught.value))
-        assert said[0] == said[1]
-    rod = SpectralRod(scene, 15)
-    z = rod.start(scene)
-    pi, hi = z.pi[None].copy(), z.hi.copy()
-    taken, _ = gauss(rod.kernel, hi, z.lo.copy(), pi, tuple(tableau(4)), 0.1, 5, 50, 1e-8, 0.5 * rod.energy(z))
-    assert taken == 0
-    np.testing.assert_array_equal(hi, z.hi)
-    np.testing.assert_array_equal(pi[0], z.pi)
+            sweeps = compiled_step(rod.kernel, *z, modes, tuple(tableau(stages)), scene.duration / 5, 40, 1e-12, v)
+            plain, rates, count = collocation.step(rod, plain, modes, scene.duration / 5, stages, 40, 1e-12)
+            assert count == sweeps > 1
+            np.testing.assert_allclose(v, rates, atol=1e-9)
+        np.testing.assert_allclose(z.hi + z.lo, plain.hi + plain.lo, atol=1e-11)
+        np.testing.assert_allclose(z.pi, plain.pi, atol=1e-12)
 
 
 def bent(s):
@@ -149,7 +133,7 @@ def bent(s):
     return z.real, z.imag, 0 * s, 0.3 + 0.9 * np.cos(np.pi * s / 3)
 
 
-def test_a_line_that_starts_bent_at_a_free_end_is_named(rolling):
+def test_a_line_that_starts_bent_at_a_free_end_is_named(rolling, monkeypatch):
     def arc(s):
         return 2.5 * np.sin(0.4 * s), 2.5 * (1 - np.cos(0.4 * s)), 0 * s, 0.4 + 0 * s
 
@@ -159,10 +143,12 @@ def test_a_line_that_starts_bent_at_a_free_end_is_named(rolling):
     def uneven_but_straight(s):
         return s + 0.05 * s**2, 0.3 * (s + 0.05 * s**2), 0 * s, 0.4 + 0 * s
 
-    start = Scene(rod=Rod(**PAPER | {"radius": 0.5}), initial=arc, duration=400.0, rolling=rolling)
+    start = Scene(rod=Rod(**PAPER | {"radius": 0.5}), initial=arc, duration=4.0, rolling=rolling)
     for initial in (arc, bent_at_the_far_end):
-        with pytest.raises(SimulationError, match=r"steps do not converge.*starts bent at a free end"), np.errstate(all="ignore"):
-            Course(replace(start, initial=initial), np.array([400.0]), 1e-8, tqdm(disable=True)).run(15, 40)
+        assert "starts bent at a free end" in bent_hint(replace(start, initial=initial))
+    monkeypatch.setattr("continuum.stepping.MOST_STEPS", 20)
+    with pytest.raises(ValueError, match=r"not reached in 20 time steps.*starts bent at a free end"):
+        solve(start, 1e-8, progress=False)
     fair = [
         untwisting_rod(rolling),
         breathing_ring(rolling),
@@ -191,7 +177,7 @@ def test_tolerance_is_met_and_the_estimate_is_honest(rolling, make):
     rod, z = followed(scene, 77, 400)
     for tol in (1e-3, 1e-4, 1e-5) if scene.name == "scene" else (1e-3, 1e-4, 1e-5, 1e-6):
         field = solve(scene, tol, frames=1, progress=False)
-        truth = rod.at(z, field.s)
+        truth = rod.reader(field.s)(z)
         error = max(np.abs(getattr(field, name)[-1] - truth[name]).max() for name in POSITIONS)
         estimate = max(field.error_estimate[name] for name in POSITIONS)
         assert error <= tol, (tol, error)
@@ -232,7 +218,7 @@ def test_waved_ring_to_nine_digits(rolling):
     scene = Scene(rod=ring.rod, initial=initial, duration=0.6, rolling=rolling, closed=True)
     field = solve(scene, 1e-9, frames=1, progress=False)
     rod, z = followed(scene, 77, 200)
-    truth = rod.at(z, field.s)
+    truth = rod.reader(field.s)(z)
     assert np.ptp(np.hypot(truth["x"], truth["y"])) > 5e-3
     for name in POSITIONS:
         error = np.abs(getattr(field, name)[-1] - truth[name]).max()
@@ -251,7 +237,7 @@ def test_free_ends_keep_their_slope(rolling):
     """|r'| = 1 at a free end for all time, to the accuracy of the solution: a sharp test of the ends."""
     scene = untwisting_rod(rolling, **UNEVEN)
     rod, z = followed(scene, 55, 64)
-    slopes = rod.slopes(z)
+    slopes = np.abs(rod.slopes(z))
     assert np.abs(slopes[[0, -1]] - 1).max() < 1e-5
     assert np.abs(slopes - 1).max() > 1e-2
 

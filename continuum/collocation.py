@@ -1,0 +1,59 @@
+"""One Gauss step of a rod on n functions in NumPy; the compiled twin is `continuum.kernels.collocation`.
+
+The stages are those of `discs.integrators.gauss`, and so is a sweep. Three things differ, as steps are long here and matrices full.
+The common C is that of an earlier step, and its matrix is kept by its eigenvectors, which serve all lengths of steps. A step ends
+when the rates of all stages are settled, not only the momenta. And sweeps are mixed by Anderson's method of depth 2 (Walker and Ni,
+SIAM J. Numer. Anal. 49, 2011): the next guess is that combination of the last three results, with factors of sum one, whose changes
+add up to the least. Sweeps then converge for longer steps, in half their number and less.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from continuum.galerkin import Modes, SpectralRod
+from discs.integrators.gauss import tableau
+from discs.system import Phase, add
+
+
+def step(
+    rod: SpectralRod, z: Phase, modes: Modes, h: float, stages: int, sweeps: int, tolerance: float
+) -> tuple[Phase, NDArray, int]:
+    """The state a time h after z, the rates of the stages (stages, 3, n), and the number of sweeps.
+
+    Parameters
+    ----------
+    modes : of a configuration not far away.
+    stages : even.
+    tolerance : of the positions' last change, in units of `rod.scale`; where so many `sweeps` do not reach it, z and 0 are
+        returned.
+    """
+    a, b, last, _, _, _, *pairs = tableau(stages)
+    base = z.hi + z.lo
+    p = np.array([z.pi] * stages)
+    v = rod.forward(rod.frame(base), p)
+    results: list[tuple[NDArray, NDArray, NDArray]] = []
+    for sweep in range(1, sweeps + 1):
+        c = rod.frame(base + h * np.tensordot(a, v, 1))
+        force = rod.back(c, rod.mean_force(base + h * np.tensordot(a, rod.forward(c, p), 1)))
+        rest = z.pi - p - h * np.tensordot(a, force, 1)
+        for value, into, out in zip(*pairs, strict=True):
+            part = modes.vectors @ ((modes.back @ (into @ rest)) / (1 + h * h * value**2 * modes.values))
+            p = p + np.multiply.outer(out, part).real
+        moved = rod.forward(c, p) - v
+        v = v + moved
+        if (np.abs(0.5 * h * moved) <= tolerance * rod.scale[:, None]).all():
+            return Phase(*add(z.hi, z.lo, h * np.tensordot(b, v, 1)), z.pi + last @ (p - z.pi)), v, sweep
+        if not np.isfinite(moved).all():
+            break
+        results = [(v, p, moved), *results[:2]]
+        factors = mixing([change for _, _, change in results])
+        v, p = (sum(x * result[i] for x, result in zip(factors, results, strict=True)) for i in (0, 1))
+    return z, v, 0
+
+
+def mixing(changes: list[NDArray]) -> NDArray:
+    """Factors of sum one that make the sum of at most three changes the least; the newest comes first."""
+    newest = changes[0].ravel()
+    less = np.array([newest - other.ravel() for other in changes[1:]]).reshape(-1, newest.size)
+    others = np.linalg.lstsq(less.T, newest, rcond=1e-6)[0]
+    return np.concatenate([[1 - others.sum()], others])

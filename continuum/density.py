@@ -1,0 +1,85 @@
+"""Where a field needs more functions: a coordinate xi in [-1, 1] in which narrow features of the initial data are wide."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from continuum.initial import Resolved
+
+REACH = 3.0  # of a centre, in widths of its feature
+CROWD = 0.6  # of a centre: by how much its share of xi exceeds that of the whole rod
+
+
+@dataclass(frozen=True)
+class Density:
+    """xi' proportional to 1 + sum_c A_c/(1 + ((s - s_c)/w_c)^2) on [0, length], from -1 to 1; linear without centres.
+
+    Parameters
+    ----------
+    centres : (s_c, w_c, A_c): place, reach and height.
+    """
+
+    length: float
+    centres: tuple[tuple[float, float, float], ...] = ()
+
+    @classmethod
+    def of(cls, initial: Resolved) -> "Density":
+        """A density for a scene's narrow features: each gets functions for a share of the rod, however narrow it is.
+
+        Linear on a closed scene, and where fields vary over short distances everywhere: there are no places to prefer.
+        """
+        scene, widths = initial.scene, np.diff(initial.pieces)
+        length, middle = scene.rod.length, initial.pieces[:-1] + widths / 2
+        centres, far = [], np.ones_like(widths, bool)
+        for place, width in initial.features:
+            reach = REACH * width
+            centres.append((place, reach, CROWD * length / (np.pi * reach)))
+            far &= np.abs(middle - place) > 4 * reach
+        if scene.closed or not far.any() or widths[far].min() < 3 * widths.min():
+            return cls(length)
+        return cls(length, tuple(centres))
+
+    def _grown(self, s: NDArray | float) -> NDArray:
+        """int xi' ds, but for a factor and a constant."""
+        total = np.array(s, dtype=float)
+        for place, reach, height in self.centres:
+            total += height * reach * np.arctan((s - place) / reach)
+        return total
+
+    @property
+    def _scale(self) -> float:
+        return 2 / float(self._grown(self.length) - self._grown(0.0))
+
+    def coordinate(self, s: NDArray) -> NDArray:
+        """xi at places s (S,)."""
+        return np.clip(self._scale * (self._grown(s) - self._grown(0.0)) - 1, -1.0, 1.0)
+
+    def rate(self, s: NDArray) -> NDArray:
+        """xi' at places s (S,), 1/length."""
+        total = np.ones_like(s)
+        for place, reach, height in self.centres:
+            total += height / (1 + ((s - place) / reach) ** 2)
+        return self._scale * total
+
+    def change(self, s: NDArray) -> NDArray:
+        """xi'' at places s (S,), 1/length^2."""
+        total = np.zeros_like(s)
+        for place, reach, height in self.centres:
+            u = (s - place) / reach
+            total -= 2 * height * u / reach / (1 + u * u) ** 2
+        return self._scale * total
+
+    def place(self, xi: NDArray) -> NDArray:
+        """s at xi (S,): by halving, then by Newton steps to round-off."""
+        if not self.centres:
+            return (xi + 1) * (self.length / 2)
+        low, high = np.zeros_like(xi), np.full_like(xi, self.length)
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            above = self.coordinate(middle) > xi
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        s = 0.5 * (low + high)
+        for _ in range(3):
+            s = np.clip(s - (self.coordinate(s) - xi) / self.rate(s), 0.0, self.length)
+        return s

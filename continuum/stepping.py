@@ -1,0 +1,177 @@
+"""Motions of a rod on n functions in Gauss steps of variable length.
+
+The collocation polynomial of a step with s stages is of degree s in time. The size of its highest Legendre coefficient at the
+nodes, in x, y and theta, is taken as the step's error, and its length chosen so that this is the tolerance (per step; what it makes
+of the whole motion is measured by `continuum.spectral`). That bounds the polynomial and not only its end, which is more accurate
+where the motion is smooth; waves that a step does not resolve spoil the ends too. A step that does not converge, or takes many
+sweeps, makes the next one shorter.
+
+Long steps must not jump over the end of a motion: under the unit law a heading is lost where z = r' vanishes, at a point or, when a
+ring collapses, everywhere. A step in which Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at a node is taken again with half its length. So
+|r'| at most halves in a step, and once it is below `LOST_HEADING` before such a step the heading is lost. No other motion ends:
+where steps become too short without that, the motion is too fast for them.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from continuum import collocation
+from continuum.galerkin import Modes, SpectralRod
+from discs import SimulationError
+from discs.integrators.gauss import tableau
+from discs.kernels.limits import LOST_HEADING
+from discs.system import Phase
+
+STAGES = ((1e-5, 4), (2e-7, 6), (2e-9, 8), (0.0, 12))  # from which tolerance on
+SWEEPS = 40
+FEW_SWEEPS = 18  # steps that take more are made shorter
+MODES = 0.4  # sweeps that new modes cost, times stages over functions
+ACCEPTED = 4.0  # times the tolerance
+SHORTEST = 1e-9  # of the duration
+MOST_STEPS = 2**14
+
+
+def stages(tolerance: float) -> int:
+    """Stages of a step for a tolerance."""
+    return next(number for least, number in STAGES if tolerance >= least)
+
+
+def finer(tolerance: float) -> float:
+    """A tolerance for which steps are about 1.5 times shorter, by their order s/2; errors of order 3 then fall to a third."""
+    return tolerance / min(1.5 ** (stages(tolerance) / 2 + 1), 8.0)
+
+
+def coarser(tolerance: float) -> float:
+    """A tolerance for which they are as much longer."""
+    return tolerance**2 / finer(tolerance)
+
+
+def sweeps(tolerance: float) -> float:
+    """The tolerance of the sweeps of such a step, in units of a rod's scale."""
+    return min(1e-8, 1e-2 * tolerance)
+
+
+class TooFast(SimulationError):
+    """Steps became too short, or too many."""
+
+
+class Steps:
+    """A rod's motion from its start, step by step.
+
+    Parameters
+    ----------
+    duration : to which steps are taken.
+    tolerance : of a step.
+    first : length of the first step that is tried.
+    compiled : whether steps are taken by `continuum.kernels`, or by their plain twin.
+
+    Attributes
+    ----------
+    lengths : of the steps taken.
+    """
+
+    def __init__(self, rod: SpectralRod, duration: float, tolerance: float, first: float, compiled: bool = True) -> None:
+        self.rod, self._duration, self._tolerance, self._compiled = rod, duration, tolerance, compiled
+        self._stages = stages(tolerance)
+        self._sweeps = sweeps(tolerance)
+        nodes, _ = legendre.leggauss(self._stages)
+        self._series = np.linalg.inv(legendre.legvander(nodes, self._stages - 1))[-2:]  # of the rates of the stages
+        self._next = first
+        self._modes: Modes | None = None
+        self._usual, self._excess = 0, 0  # sweeps of a step with its own modes; how many more it took since
+        self.lengths: list[float] = []
+
+    def at(self, times: NDArray) -> Iterator[Phase]:
+        """The states at times (F,), increasing; those between two steps by a shorter step of its own."""
+        t, z = 0.0, self.rod.start
+        before = t, z
+        for time in times.tolist():
+            while t < time:
+                before = t, z
+                t, z = self._advance(t, z)
+            if t == time:
+                yield z
+            else:
+                kept = self._modes, self._usual, self._excess
+                shown, _, taken = self._step(before[1], time - before[0])
+                self._modes, self._usual, self._excess = kept  # frames leave the motion as it is
+                if not taken:
+                    raise self._too_fast(before[0])
+                yield shown
+
+    def _step(self, z: Phase, h: float) -> tuple[Phase, NDArray, int]:
+        """As `collocation.step`: with the modes of an earlier step as long as they save more than they cost."""
+        fresh = self._modes is None or self._excess > MODES * self.rod.n / self._stages
+        while True:
+            if fresh:
+                c = self.rod.frame(z.hi + z.lo)
+                self._modes = self.rod.modes(self.rod.frame(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi)))
+            after, v, taken = self._sweep(z, h)
+            if fresh:
+                self._usual, self._excess = taken, 0
+            else:
+                self._excess += max(taken - self._usual, 0)
+            if taken or fresh:
+                return after, v, taken
+            fresh = True
+
+    def _sweep(self, z: Phase, h: float) -> tuple[Phase, NDArray, int]:
+        assert self._modes is not None
+        if not self._compiled:
+            return collocation.step(self.rod, z, self._modes, h, self._stages, SWEEPS, self._sweeps)
+        from continuum.kernels.collocation import step
+
+        after = Phase(z.hi.copy(), z.lo.copy(), z.pi.copy())
+        v = np.empty((self._stages, 3, self.rod.n))
+        taken = step(self.rod.kernel, *after, self._modes, tuple(tableau(self._stages)), h, SWEEPS, self._sweeps, v)
+        return after, v, taken
+
+    def _advance(self, t: float, z: Phase) -> tuple[float, Phase]:
+        """One step from z at t that converges and is within the tolerance."""
+        slopes = self.rod.slopes(z)
+        while True:
+            left = self._duration - t
+            h = left if self._next >= 0.9999 * left else min(self._next, left / 2)
+            if len(self.lengths) >= MOST_STEPS:
+                raise ValueError(
+                    f"tol is not reached in {MOST_STEPS} time steps: the motion is too sensitive or too fast; "
+                    "ask for a larger tol or a shorter duration"
+                )
+            if h < SHORTEST * self._duration:
+                raise self._too_fast(t)
+            after, v, taken = self._step(z, h)
+            if not taken or self._turned(slopes, after):
+                self._check_heading(slopes, t)
+                self._next = h / 2
+                continue
+            error = self._error(v, h)
+            growth = 0.9 * (self._tolerance / max(error, 1e-300)) ** (2 / self._stages)
+            if not error <= ACCEPTED * self._tolerance:
+                self._next = h * max(0.3, growth)
+                continue
+            self._next = h * min(1.8, max(0.5, growth)) * min(max(FEW_SWEEPS / taken, 0.6), 1.0)
+            self.lengths.append(h)
+            return (self._duration if h == left else t + h), after
+
+    def _turned(self, slopes: NDArray, after: Phase) -> bool:
+        """Whether a heading may have been lost within a step, from slopes (n,) before it."""
+        return self.rod.unit and bool(((slopes.conj() * self.rod.slopes(after)).real < 0.5 * np.abs(slopes) ** 2).any())
+
+    def _error(self, v: NDArray, h: float) -> float:
+        """Size of the highest coefficient in time of x, y, theta; of the last but one where that is far larger."""
+        degrees = 2 * np.array([self._stages - 2, self._stages - 1]) + 1
+        q = h / 2 * np.tensordot(self._series, v, 1) / degrees[:, None, None]
+        sizes = np.maximum(np.abs(q[:, :2] @ self.rod.line.T).max(axis=(1, 2)), np.abs(q[:, 2]).max(axis=1))
+        return float(max(sizes[1], 0.03 * sizes[0]))
+
+    def _check_heading(self, slopes: NDArray, t: float) -> None:
+        node = int(np.argmin(np.abs(slopes)))
+        if self.rod.unit and not abs(slopes[node]) > LOST_HEADING:
+            message = "the rod lost its heading: r' = 0, and rolling='unit' has no direction there"
+            raise SimulationError(message, len(self.lengths), t, node)
+
+    def _too_fast(self, t: float) -> TooFast:
+        return TooFast("steps do not converge, however short: the motion is too fast for them", len(self.lengths), t, 0)

@@ -1,0 +1,91 @@
+"""Steps of variable length: their error, frames, the end of a motion told from steps that are too long, both engines."""
+
+import numpy as np
+import pytest
+
+from continuum import Scene, breathing_ring, exact, solve, stepping, untwisting_rod
+from continuum.galerkin import SpectralRod
+from continuum.spectral import Course
+from continuum.stepping import Steps
+from discs import SimulationError
+from discs.kernels import limits
+
+
+def largest(a, b):
+    return max(np.abs(a[name] - b[name]).max() for name in ("x", "y", "theta"))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_a_motion_errs_by_about_the_tolerance_of_its_steps(rolling, tolerance):
+    """The paper's scene on 37 functions against steps of a far smaller tolerance; every number of stages."""
+    course = Course(untwisting_rod(rolling), np.array([2.0, 4.5]))
+    error = largest(course.run(37, tolerance).fields, course.run(37, 1e-3 * tolerance).fields)
+    assert 0.03 * tolerance < error < 20 * tolerance
+
+
+def test_frames_do_not_change_the_motion():
+    scene = untwisting_rod()
+    rod = SpectralRod(scene, 27)
+    few, many = (Steps(rod, 4.5, 1e-4, 0.3) for _ in range(2))
+    (end,) = few.at(np.array([4.5]))
+    states = list(many.at(np.linspace(0, 4.5, 31)))
+    assert few.lengths == many.lengths
+    np.testing.assert_array_equal(states[0].hi, rod.start.hi)
+    np.testing.assert_array_equal(states[-1].hi, end.hi)
+    np.testing.assert_allclose([rod.energy(z) for z in states], np.pi**4 / 80, rtol=1e-6)
+
+
+def test_both_engines_agree(rolling):
+    times = np.array([0.0, 1.3, 4.5])
+    a, b = (Course(untwisting_rod(rolling, length=3.0, radius=0.8), times, compiled).run(15, 1e-4) for compiled in (True, False))
+    assert a.steps == b.steps
+    for name, value in a.fields.items():
+        np.testing.assert_allclose(value, b.fields[name], atol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("duration", [16, 20, 22, 31, 47, 52, 55, 59])
+def test_long_motions_are_followed_to_their_end(rolling, duration):
+    """Whole durations that were taken for the end of the motion, where steps had only been too long."""
+    field = solve(untwisting_rod(rolling, duration=float(duration)), 1e-3, frames=2, progress=False)
+    if (rolling, duration) == ("field", 20):  # on 71 functions, 2048 steps
+        for name, value in (("x", 0.0380256), ("y", 0.4516638), ("theta", -1.1169991)):
+            assert abs(getattr(field, name)[-1, 0] - value) < field.error_estimate[name] < 1e-3
+
+
+@pytest.mark.parametrize("omega", [0.4, 1.0, 2.0])
+def test_a_ring_s_collapse_is_told_from_steps_that_are_too_long(omega):
+    """By |r'|, at the time that is known, however long the steps: they must not jump over it."""
+    scene = breathing_ring("unit", omega=omega, duration=30.0)
+    radius = 2 / np.pi  # a0; M a.. = -K R^2 a/a0^4, a(0) = a0, a.(0) = -R omega
+    frequency = np.sqrt(0.7 / 2) / radius**2
+    collapse = np.arctan(radius * frequency / omega) / frequency
+    before = solve(breathing_ring("unit", omega=omega, duration=0.98 * collapse), 1e-5, frames=2, progress=False)
+    truth = exact.ring(scene.rod, before.t, omega, "unit").radius
+    assert np.abs(np.hypot(before.x, before.y) - truth[:, None]).max() < 1e-5
+    for tol, early in ((1e-2, 2e-3), (1e-6, 2e-2)):  # rounding grows as r' vanishes, the more the more functions there are
+        with pytest.raises(SimulationError, match="the rod lost its heading: r' = 0") as caught:
+            solve(scene, tol, frames=2, progress=False)
+        assert 0 < collapse - caught.value.time < early * collapse
+
+
+def test_headings_are_lost_at_the_discs_threshold():
+    assert stepping.LOST_HEADING is limits.LOST_HEADING
+    scene = breathing_ring("unit", duration=30.0)
+    rod = SpectralRod(scene, 19)
+    states = Steps(rod, 30.0, 1e-5, 2.0).at(np.linspace(0.7, 0.9, 4001))
+    seen: list[float] = []
+    with pytest.raises(SimulationError, match="lost its heading"):
+        seen.extend(np.abs(rod.slopes(z)).min() for z in states)
+    assert 0 < seen[-1] < 2 * limits.LOST_HEADING
+    assert min(seen[:-10]) > limits.LOST_HEADING
+
+
+def test_a_motion_that_is_too_fast_is_named():
+    """Another omega at every node: no step is short enough."""
+
+    def fast(s):
+        return s, 0 * s, 0 * s, 1e12 * np.cos(np.pi * s / 4)
+
+    scene = Scene(rod=untwisting_rod().rod, initial=fast, duration=1.0)
+    with pytest.raises((SimulationError, ValueError), match="too fast"):
+        solve(scene, 1e-3, progress=False)
