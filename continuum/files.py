@@ -3,10 +3,14 @@
 import inspect
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from continuum.rod import Scene
 from continuum.scenes import LAW, PAPER, SCENES, steered_rod
 from discs import checks
+from discs.files import opened
+
+LARGEST = 2**14  # bytes of a scene file; a key of many parts, as a.a.a, takes memory as the square of its length
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -21,12 +25,8 @@ def read_scene(path: str | Path) -> Scene:
     ------
     ValueError : if the file cannot be read, or a key or value is not one of the scene's.
     """
-    try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"the scene file {path} cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"the scene file {path} is not TOML: {error}") from None
+    with open(opened(path), "rb") as file:
+        content = _toml(path, file.read(LARGEST + 1))
     if "scene" not in content:
         raise ValueError(
             f"the scene file {path} must name its scene, as in scene = {next(iter(SCENES))!r}; its keys are {list(content)}"
@@ -36,3 +36,14 @@ def read_scene(path: str | Path) -> Scene:
     for key in content:
         checks.choice(f"key of {make.__name__}", key, (*own, *PAPER, *(LAW if make is not steered_rod else ())))
     return make(**content)
+
+
+def _toml(path: str | Path, content: bytes) -> dict[str, Any]:
+    if len(content) > LARGEST:
+        raise ValueError(f"the scene file {path} is larger than {LARGEST} bytes, and a scene takes some hundreds")
+    try:
+        return tomllib.loads(content.decode())
+    except RecursionError:
+        raise ValueError(f"the scene file {path} has more brackets within brackets than can be followed") from None
+    except ValueError as error:
+        raise ValueError(f"the scene file {path} is not TOML: {error}") from None

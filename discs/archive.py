@@ -5,8 +5,9 @@ attributes (parameters that differ from disc to disc as variables), and a checks
 """
 
 import json
-import shutil
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from platform import python_version
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import checks
+from discs import checks, files
 from discs.chain import Chain, SteeredChain
 from discs.problem import Problem, State
 from discs.solution import Solution
@@ -27,6 +28,8 @@ FORMAT = "rolling-discs run, version 1"
 UNITS = "any consistent system; units name the quantity, as 'length per time'"
 WROTE = 1 << 32  # added to the checksum of a frame that is there, so that it is never zero
 MAPPED = 64 * 2**20  # bytes; arrays of larger files are mapped, not read
+SUFFIXES = (".nc", ".nc4", ".h5", ".hdf5")  # of NetCDF-4, which is HDF5
+STATS_ROOM = 8192  # bytes; what is kept free for the stats of a run on its way
 CHAINS: dict[str, type[Chain] | type[SteeredChain]] = {"Chain": Chain, "SteeredChain": SteeredChain}
 
 
@@ -140,7 +143,7 @@ def header(
         "unit_system": UNITS,
         "problem": as_text(told),
         "method": str(stats.get("method")),
-        "stats": as_text(stats),
+        "stats": as_text(stats).ljust(0 if complete else STATS_ROOM),  # blanks, which JSON allows, are room for more
         "error_estimate": as_text(estimate),
         "versions": as_text(versions()),
         # the one random thing: where the search for the stiffest mode starts
@@ -212,29 +215,63 @@ def to_xarray(run: Solution) -> "xarray.Dataset":
 CHECKSUM = "CRC-32 of the frame plus 2**32; 0 where it has not been written"
 
 
+def named(path: str | Path) -> Path:
+    """The file of a run that a path names, links followed; ValueError for another ending or where no file can be."""
+    real = files.target(path)
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise ValueError(f"{path} would be a NetCDF-4 file: its name must end in {', '.join(SUFFIXES)}")
+    return real
+
+
+def restart_of(path: Path) -> Path:
+    """The restart file of a run on its way into the file at `path`; who writes that file holds this one."""
+    return path.with_name(path.name + ".restart")
+
+
+def busy(path: str | Path) -> ValueError:
+    """What is raised where another run has the file."""
+    return ValueError(f"{path} is being written by another run: wait for its end, or give another path")
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """The real file at a path that is about to be replaced or deleted; what a run that was interrupted has left beside it goes too.
+
+    ValueError if a run writes to it.
+    """
+    real = named(path)
+    restart = restart_of(real)
+    if not restart.exists():
+        yield real
+        return
+    try:
+        held = files.hold(restart)
+    except BlockingIOError:
+        raise busy(path) from None
+    done = None
+    try:
+        yield real
+        done = restart
+    finally:
+        files.release(held, done)
+
+
 def save(run: Solution, path: str | Path) -> None:
-    """Write a run; the file at `path` is the old one or the new one, never half of it."""
-    from discs.framefile import FrameFile, fresh
+    """Write a run; the file at `path` is the old one or the new one, never half of it.
+
+    Raises
+    ------
+    ValueError : if the name does not end as those of NetCDF-4 files do, no file can be made there, a run writes to it, or there is
+        too little room.
+    """
+    from discs.framefile import FrameFile, room
 
     rows = recorded(run)
-    with fresh(path) as temporary:
-        shapes = {name: value.shape[1:] for name, value in rows.items()}
-        with FrameFile.create(temporary, header(run.problem, run.t, run.s, run.stats, run.error_estimate, True), shapes) as file:
-            for f in range(run.t.size):
-                file.write(f, {name: value[f] for name, value in rows.items()})
-            file.flush()
-
-
-def finish(path: str | Path, stats: dict[str, Any]) -> None:
-    """Say in the file of a run that it is complete, and its stats; in a copy that takes its place."""
-    import h5py
-
-    from discs.framefile import fresh
-
-    with fresh(path) as temporary:
-        shutil.copyfile(path, temporary)
-        with h5py.File(temporary, "r+") as file:
-            file.attrs["stats"], file.attrs["complete"] = fixed(as_text(stats)), 1
+    head = header(run.problem, run.t, run.s, run.stats, run.error_estimate, True)
+    shapes = {name: value.shape[1:] for name, value in rows.items()}
+    with replacing(path) as real, files.fresh(real, room(head, shapes)) as new, FrameFile.create(new.name, head, shapes) as file:
+        for f in range(run.t.size):
+            file.write(f, {name: value[f] for name, value in rows.items()})
 
 
 def load(path: str | Path) -> Solution:
@@ -245,7 +282,7 @@ def load(path: str | Path) -> Solution:
 
     Raises
     ------
-    ValueError : if the file cannot be read, is not a run, is cut off or damaged.
+    ValueError : if the file cannot be read, is not a run, is cut off or damaged, or too large for this machine's memory.
     """
     from discs.framefile import FrameFile
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from discs.archive import QUANTITIES, describe, load
-from discs.framefile import FrameFile, check_writable, fresh
+from discs.archive import QUANTITIES, describe, load, named, replacing
+from discs.files import check_writable, fresh
+from discs.framefile import FrameFile
 from discs.integrators import METHODS
 from discs.marching import SimulationError
 from discs.problem import Problem
@@ -17,6 +18,7 @@ from discs.simulation import ENGINES, WANTS, simulate
 from discs.solution import Solution
 from discs.stencils import ENDS
 from discs.trust import doubts
+from discs.untrusted import printable
 
 OFFERS = sorted({name for method in METHODS.values() for name in method.offers})
 
@@ -99,12 +101,14 @@ def clear_way(options: argparse.Namespace, whole: bool) -> None:
         raise ValueError("--overwrite goes with --save FILE")
     if not options.save:
         return
-    path = Path(options.save)
+    path = named(options.save)
     check_writable(path)
     if path.exists() and options.overwrite:
         with FrameFile.open(path):  # nothing but a run is ever deleted
             pass
-        path.unlink()
+        with replacing(path) as real:
+            if not whole:  # otherwise the new run takes the place of the old one at its end
+                real.unlink()
     elif path.exists() and whole:
         raise ValueError(f"{path} exists; give --overwrite to replace it")
 
@@ -112,20 +116,20 @@ def clear_way(options: argparse.Namespace, whole: bool) -> None:
 def summary(run: Solution) -> str:
     """What came out, in a few lines."""
     stats, drift = run.stats, np.abs(run.energy - run.energy[0]).max()
-    what = f"field of the {stats['scene']['name']} on {run.s.size} nodes" if is_field(run) else f"{run.s.size} discs"
+    what = f"field of the {printable(stats['scene']['name'])} on {run.s.size} nodes" if is_field(run) else f"{run.s.size} discs"
     lines = [f"{what}, {run.t.size} frames, t = {run.t[0]:g} to {run.t[-1]:g}"]
     if stats.get("frames_missing"):
         lines.append(f"unfinished: {stats['frames_missing']} frames are not there yet")
     done = [f"dt = {stats['dt']:g}" + (" (suggested)" if stats.get("dt_suggested") else "")] if stats.get("dt") else []
     done += [f"{stats['steps']} steps"] if "steps" in stats else []
     done += [f"{stats['seconds']:.3g} s"] if "seconds" in stats else []
-    lines.append(f"method {stats.get('method')}" + (f": {', '.join(done)}" if done else ""))
+    lines.append(f"method {printable(stats.get('method'))}" + (f": {', '.join(done)}" if done else ""))
     lines.append(f"energy {run.energy[0]:.9g}, changed by {drift:.1e} at most")
     if run.rolling_residual is not None:
         lines.append(f"largest slip {run.rolling_residual.max():.1e}")
     lines += [f"not to be trusted: {doubt}" for doubt in doubts(stats)]
     if run.error_estimate:
-        errors = ", ".join(f"{name} {error:.1e}" for name, error in run.error_estimate.items())
+        errors = ", ".join(f"{printable(name)} {error:.1e}" for name, error in run.error_estimate.items())
         lines.append(f"estimated error: {errors}")
     return "\n".join(lines)
 
@@ -139,13 +143,13 @@ def about(path: str | Path) -> str:
     """What is in a file: the run, its parameters, what it was made with."""
     run, told = load(path), []
     if is_field(run):
-        told = [f"{name} = {value}" for name, value in run.stats["scene"].items()]
+        told = [f"{printable(name)} = {printable(value)}" for name, value in run.stats["scene"].items()]
     elif run.problem is not None:
         numbers, arrays = describe(run.problem)
         told = [f"{name} = {value}" for name, value in numbers.items() if value is not None]
         told += [f"{name}: {value.size} numbers, {value.min():.6g} to {value.max():.6g}" for name, value in arrays.items()]
     with FrameFile.open(path) as file:
-        made = ", ".join(f"{name} {value}" for name, value in file.attrs["versions"].items())
+        made = ", ".join(f"{printable(name)} {printable(value)}" for name, value in file.attrs["versions"].items())
     recorded = ", ".join(name for name in QUANTITIES if getattr(run, name) is not None)
     return "\n".join([summary(run), f"recorded: {recorded}", *told, f"made with {made}"])
 
@@ -155,14 +159,20 @@ def draw(options: argparse.Namespace) -> None:
     run, out = load(options.file), Path(options.out)
     check_writable(out)
     if options.command == "plot":
-        with fresh(out) as temporary:
+        with fresh(out) as new:
             figure = run.plot()[0].figure
-            figure.savefig(temporary, format=out.suffix.removeprefix(".") or "png")  # type: ignore[union-attr]
+            figure.savefig(new, format=out.suffix.removeprefix(".") or "png")  # type: ignore[union-attr]
     elif options.command == "animate":
         run.animate(out, fps=options.fps)
     else:
         run.view(out, beside=load(options.beside) if options.beside else None)
     print(f"written to {out}")
+
+
+def failed(error: object, code: int) -> int:
+    """Say what was wrong, in one line; names and texts of files may be in it."""
+    print(f"error: {printable(error)}", file=sys.stderr)
+    return code
 
 
 def main(parser: argparse.ArgumentParser, arguments: list[str] | None) -> int:
@@ -172,14 +182,11 @@ def main(parser: argparse.ArgumentParser, arguments: list[str] | None) -> int:
     try:
         options.run(options)
     except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        return failed(error, 2)
     except MemoryError as error:
-        print(f"error: too large for this machine's memory: {error}", file=sys.stderr)
-        return 2
+        return failed(f"too large for this machine's memory: {error}", 2)
     except SimulationError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+        return failed(error, 1)
     except KeyboardInterrupt as stop:
         print(str(stop) or "interrupted; what is on disc is whole", file=sys.stderr)
         return 130

@@ -5,11 +5,7 @@ frame is written by the operating system at a known place, past the HDF5 library
 A frame's checksum is written last; until then the frame does not count.
 """
 
-import json
 import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,43 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import archive, checks
+from discs import archive, checks, files, untrusted
 from discs.archive import CHECKSUM, COORDINATES, PARAMETERS, QUANTITIES, Header, attributes, dimensions
 from discs.problem import Problem
 from discs.solution import Solution
 
 NUMBER, COUNT = np.dtype("<f8"), np.dtype("<i8")
+PART = 2**24  # bytes that are read at once
 DAMAGE = (OSError, KeyError, TypeError, RuntimeError, ValueError, AttributeError, RecursionError, OverflowError)
 NEEDED = ("time", "s", "checksum", "x", "y", "theta", "omega", "energy")
 
 
-def check_writable(path: Path) -> None:
-    """Raise ValueError if no file can be made at `path`."""
-    try:
-        if path.is_dir():
-            raise IsADirectoryError(0, "it is a folder")
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path} cannot be written: {getattr(error, 'strerror', error)}") from None
-
-
-@contextmanager
-def fresh(path: str | Path) -> Iterator[str]:
-    """A file to write beside `path`, which takes its place when the block ends well and vanishes when it does not."""
-    path = Path(path)
-    check_writable(path)
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    os.close(handle)
-    try:
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)  # as any other new file
-        yield temporary
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+def room(head: Header, shapes: dict[str, tuple[int, ...]]) -> int:
+    """Bytes of a file with this header whose frames have the `shapes`; at least, and nearly all of it."""
+    frame = sum(int(np.prod(shape, dtype=int)) for shape in shapes.values())
+    return 8 * (head.static["time"].size * (frame + 1) + sum(value.size for value in head.static.values()))
 
 
 class FrameFile:
@@ -64,24 +38,23 @@ class FrameFile:
     path : where it is.
     attrs : its attributes, checked, JSON as what it says.
     frames : how many there is room for.
+    places : where each variable begins in the file, bytes, and its shape.
+    size : of the file, bytes.
     """
 
     def __init__(self, path: str | Path, writable: bool) -> None:
+        self._fd = files.opened(path, os.O_RDWR if writable else os.O_RDONLY)
         self.path = Path(path)
         try:
-            self._fd = os.open(path, (os.O_RDWR if writable else os.O_RDONLY) | getattr(os, "O_BINARY", 0))
-        except (OSError, ValueError, TypeError) as error:
-            raise ValueError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
-        if self.path.is_dir():
-            os.close(self._fd)
-            raise ValueError(f"{path} cannot be read: it is a folder")
-        try:
-            self._size = os.fstat(self._fd).st_size
-            self._places = self._find()
-            self.frames = self._places["time"][1][0]
-            self.static = {name: self._read(name) for name in self._places if name in PARAMETERS | COORDINATES}
-            self._check()
-        except DAMAGE as error:
+            self.size = os.fstat(self._fd).st_size
+            self.places = self._find()
+            self._check_shapes()
+            self.frames = self.places["time"][1][0]
+            # the two that must increase tell whether the sizes are true before anything else is read
+            self.static = {name: self._increasing(name) for name in COORDINATES}
+            self.static |= {name: self._read(name) for name in self.places if name in PARAMETERS}
+            self._check_header()
+        except (*DAMAGE, MemoryError) as error:
             os.close(self._fd)
             raise self._refusal(error) from None
 
@@ -94,7 +67,7 @@ class FrameFile:
         sizes = {"time": static["time"].size}
         for name, shape in (*((name, value.shape) for name, value in static.items()), *((n, (0, *shapes[n])) for n in shapes)):
             sizes |= {d: size for d, size in zip(dimensions(name), shape, strict=True) if d != "time"}
-        with h5netcdf.File(path, "w", alignment_threshold=1, alignment_interval=64) as file:
+        with h5netcdf.File(path, "w", locking=False, alignment_threshold=1, alignment_interval=64) as file:
             file.dimensions = sizes
             for name in (*static, *shapes):
                 dims = dimensions(name)
@@ -127,20 +100,22 @@ class FrameFile:
         try:
             if told is None:
                 return None
-            if checks.whole("n", told.get("n"), 1) != self._places["s"][1][0]:
-                raise ValueError(f"n = {told['n']} of {self._places['s'][1][0]} discs")
+            if checks.whole("n", told.get("n"), 1) != self.places["s"][1][0]:
+                raise ValueError(f"n = {told['n']} of {self.places['s'][1][0]} discs")
             return archive.rebuild(told, {name: value for name, value in self.static.items() if name in PARAMETERS})
         except DAMAGE as error:
             raise self._refusal(error) from None
 
     def _refusal(self, error: BaseException) -> ValueError:
+        if isinstance(error, MemoryError):
+            return ValueError(f"{self.path} is too large for this machine's memory")
         return ValueError(f"{self.path} is not a run that was saved, or it is cut off or damaged: {_line(error)}")
 
     # Frames
 
     def __contains__(self, name: str) -> bool:
         """Whether frames record a quantity."""
-        return name in self._places
+        return name in self.places
 
     def write(self, f: int, rows: dict[str, Any]) -> None:
         """Write frame f, its checksum last."""
@@ -153,13 +128,18 @@ class FrameFile:
         """Have everything on the disc, in case the power fails."""
         os.fsync(self._fd)
 
-    def whole(self) -> int:
-        """How many frames from the first on are there."""
-        marks, names = self._read("checksum"), [name for name in QUANTITIES if name in self._places]
-        for f in range(self.frames):
-            if marks[f] == 0 or archive.frame_checksum({name: self._read(name, f) for name in names}) != marks[f]:
+    @property
+    def recorded(self) -> list[str]:
+        """Names of what a frame records."""
+        return [name for name in QUANTITIES if name in self.places]
+
+    def whole(self, most: int | None = None) -> int:
+        """How many frames from the first on are there, of at most so many."""
+        marks, most = self._read("checksum"), self.frames if most is None else most
+        for f in range(most):
+            if marks[f] == 0 or archive.frame_checksum({name: self._read(name, f) for name in self.recorded}) != marks[f]:
                 return f
-        return self.frames
+        return most
 
     def solution(self, problem: Problem | None = None) -> Solution:
         """The frames that are there; ValueError if there are none, or too few in a complete file. A known `problem` is not read."""
@@ -170,7 +150,7 @@ class FrameFile:
             if not count:
                 raise ValueError(f"{self.path} holds no frame yet")
             missing = {"frames_missing": self.frames - count}
-        rows = {name: self._rows(name, count) for name in QUANTITIES if name in self._places}
+        rows = {name: self._rows(name, count) for name in self.recorded}
         return Solution(
             t=self.static["time"][:count],
             s=self.static["s"],
@@ -181,30 +161,48 @@ class FrameFile:
         )
 
     def _write(self, name: str, f: int, value: NDArray) -> None:
-        offset, left = self._places[name][0] + f * value.nbytes, value.reshape(-1).view(np.uint8).data
-        while left:
-            done = os.pwrite(self._fd, left, offset)
-            offset, left = offset + done, left[done:]
+        files.write_all(self._fd, value.reshape(-1).view(np.uint8).data, self.places[name][0] + f * value.nbytes)
 
     def _read(self, name: str, f: int | None = None) -> NDArray:
         """A variable, or its frame f, read from the file."""
-        offset, shape = self._places[name]
+        offset, shape = self.places[name]
         if f is not None:
             shape = shape[1:]
             offset += f * 8 * int(np.prod(shape, dtype=int))
-        data, left = bytearray(), 8 * int(np.prod(shape, dtype=int))
+        return np.frombuffer(self.read_bytes(offset, 8 * int(np.prod(shape, dtype=int))), _kind(name)).reshape(shape)
+
+    def read_bytes(self, offset: int, left: int) -> bytearray:
+        """Bytes of the file from a place on."""
+        data = bytearray()
         while left:
-            part = os.pread(self._fd, left, offset)
+            part = os.pread(self._fd, min(left, PART), offset)
             if not part:
                 raise ValueError(f"{self.path} is cut off")
-            data, offset, left = data + part, offset + len(part), left - len(part)
-        return np.frombuffer(data, COUNT if name == "checksum" else NUMBER).reshape(shape)
+            data += part
+            offset, left = offset + len(part), left - len(part)
+        return data
+
+    def _increasing(self, name: str) -> NDArray:
+        """A variable whose numbers increase, read in parts, so that a file is refused early that is large and says nothing."""
+        offset, (size,) = self.places[name]
+        parts = [np.empty(0)]
+        for first in range(0, size, PART // 8):
+            parts.append(np.frombuffer(self.read_bytes(offset + 8 * first, min(PART, 8 * (size - first))), NUMBER))
+            joined = np.concatenate([parts[-2][-1:], parts[-1]])
+            if not (np.isfinite(joined).all() and (np.diff(joined) > 0).all()):
+                raise ValueError(f"{name} does not increase")
+        return np.concatenate(parts)
 
     def _rows(self, name: str, count: int) -> NDArray:
-        offset, (_, *rest) = self._places[name]
-        if self._size > archive.MAPPED:
-            return np.memmap(self.path, NUMBER, "c", offset, (count, *rest))
+        offset, (_, *rest) = self.places[name]
+        if self.size > archive.MAPPED:
+            with open(os.dup(self._fd), "rb") as file:
+                return np.memmap(file, NUMBER, "c", offset, (count, *rest))
         return self._read(name)[:count]
+
+    def same(self) -> bool:
+        """Whether the file is still the one at its path."""
+        return files.same(self._fd, self.path)
 
     # What is in the file
 
@@ -213,52 +211,56 @@ class FrameFile:
         import h5py
 
         places = {}
-        with h5py.File(self.path, "r") as file:
+        with h5py.File(self.path, "r", locking=False) as file:
             if "format" not in file.attrs or self._attribute(file, "format") != archive.FORMAT:
                 raise ValueError(f"its attribute 'format' is not {archive.FORMAT!r}")
-            self.attrs: dict[str, Any] = {name: self._attribute(file, name) for name in (*TEXTS, "complete", "checksum")}
+            self.attrs: dict[str, Any] = {name: self._attribute(file, name) for name in (*untrusted.TEXTS, "complete", "checksum")}
             for name in (*QUANTITIES, *PARAMETERS, *COORDINATES, "checksum"):
                 if name not in file:
                     continue
                 if not isinstance(file.get(name, getlink=True), h5py.HardLink) or not isinstance(found := file[name], h5py.Dataset):
                     raise ValueError(f"{name} is not a variable of this file")
-                offset, need = found.id.get_offset(), COUNT if name == "checksum" else NUMBER
-                if found.dtype != need or offset is None or not 0 < offset <= self._size - 8 * found.size:
+                offset, need = found.id.get_offset(), _kind(name)
+                if found.dtype != need or offset is None or not 0 < offset <= self.size - 8 * found.size:
                     raise ValueError(f"{name} is not stored as {need} in one piece")
                 places[name] = offset, found.shape
+        if not self.same():
+            raise ValueError("it was replaced while it was read; read it again")
         return places
 
     def _attribute(self, file: Any, name: str) -> str | int:
         """An attribute that is a text of fixed length or a whole number. What it is is asked before it is read: in a changed file
         texts of any length, which stand in a heap, can keep HDF5 busy for ever."""
         kind = file.attrs.get_id(name)
-        if kind.shape not in ((), (1,)) or kind.dtype.kind not in "Si" or kind.dtype.itemsize > self._size:
+        if kind.shape not in ((), (1,)) or kind.dtype.kind not in "Si" or kind.dtype.itemsize > untrusted.LONGEST:
             raise ValueError(f"attribute {name!r} is not a text of fixed length or a whole number")
         value = np.asarray(file.attrs[name]).item()
         return value.decode() if isinstance(value, bytes) else value
 
-    def _check(self) -> None:
-        """Check shapes and header; sets `attrs` to what they say."""
+    def _check_shapes(self) -> None:
+        """Check the shapes of the variables: by them it is known what is to be read."""
         for name in NEEDED:
-            if name not in self._places:
+            if name not in self.places:
                 raise ValueError(f"{name} is missing")
-        sizes = {"axis": (2,), "disc": self._places["s"][1], "time": self._places["time"][1]}
-        for name, (_, shape) in self._places.items():
-            need = tuple(
-                sizes.get(d, shape[i : i + 1])[0] for i, d in enumerate(("time",) if name == "checksum" else dimensions(name))
-            )
+        sizes = {"axis": (2,), "disc": self.places["s"][1], "time": self.places["time"][1]}
+        for name, (_, shape) in self.places.items():
+            dims = ("time",) if name == "checksum" else dimensions(name)
+            need = tuple(sizes.get(d, shape[i : i + 1])[0] for i, d in enumerate(dims))
             if shape != need or not np.prod(shape):
                 raise ValueError(f"{name} has the shape {shape}, not {need}")
+            if shape[-1] > sizes["disc"][0] and dims[-1] in ("link", "bend"):
+                raise ValueError(f"{name} has the shape {shape}, more than one for each of {sizes['disc'][0]} discs")
+
+    def _check_header(self) -> None:
+        """Check what the header says; sets `attrs` to it."""
         if archive.header_checksum(self.attrs, self.static) != self.attrs["checksum"]:
             raise ValueError("parameters, times or places are not what was written")
-        self.attrs |= {name: json.loads(self.attrs[name]) for name in TEXTS}
-        for name, kind in TEXTS.items():
-            if not isinstance(self.attrs[name], kind):
-                raise ValueError(f"attribute {name!r} is {type(self.attrs[name]).__name__}")
+        self.attrs |= {name: untrusted.told(name, self.attrs[name]) for name in untrusted.TEXTS}
 
 
-TEXTS: dict[str, Any] = {"problem": (dict, type(None)), "stats": dict, "error_estimate": (dict, type(None)), "versions": dict}
+def _kind(name: str) -> np.dtype:
+    return COUNT if name == "checksum" else NUMBER
 
 
 def _line(error: BaseException) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__
+    return untrusted.printable(str(error).splitlines()[0] if str(error) else type(error).__name__)

@@ -2,27 +2,29 @@
 
 Beside the file `run.nc` stands `run.nc.restart` while the run is not finished: what the integrator remembers, about once a second,
 in a file that replaces the one before. After a kill the run goes on from there and takes the frames since then again, to the same
-bits.
+bits; see `discs.restart`.
 """
 
+import hashlib
 import signal
 import threading
 import time as clock
-import zipfile
-import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import archive, checks
-from discs.framefile import DAMAGE, FrameFile, fresh
+from discs import archive, checks, files, untrusted
+from discs.finishing import finish, outside
+from discs.framefile import FrameFile, room
 from discs.integrators import Integrator, from_settings
 from discs.marching import March
 from discs.problem import Problem
+from discs.restart import FROM_THE_BEGINNING, Restart
 from discs.solution import Solution
+from discs.warn import warn
 
 SECONDS = 1.0  # between two restart files, and at least twenty times what writing one takes
 SETTINGS = ("settings", "dt", "engine", "want")  # of stats: what a run must share with the one it goes on from
@@ -44,8 +46,8 @@ class Rows:
     complete = False  # whether the run was finished before
     seconds = 0.0  # spent on it before
 
-    def begin(self, march: March) -> int:
-        """Bring the run to where it was interrupted; returns the first frame to compute."""
+    def begin(self, march: March, first: Callable[[], dict[str, Any]]) -> int:
+        """Bring the run to where it was interrupted; returns the first frame to compute. `first()` is a frame at the start."""
         return 0
 
     def write(self, f: int, found: dict[str, Any]) -> None:
@@ -58,13 +60,15 @@ class Rows:
     def pause(self, f: int, march: March) -> None:
         """Between steps, before frame f is written."""
 
-    def solution(self, stats: dict[str, Any]) -> Solution:
-        """The run."""
+    def solution(self, stats: dict[str, Any], march: March | None = None) -> Solution:
+        """The run, which has come to its end."""
         return Solution(t=self.times, s=self.problem.chain.s, stats=stats, problem=self.problem, **self.rows)
 
 
 class Recording(Rows):
-    """Frames in a file.
+    """Frames in a file, which belongs to this run from the beginning to its end.
+
+    The restart file is there as long as the run, empty at first, and locked: who holds it may write the other. It names its run.
 
     Parameters
     ----------
@@ -74,106 +78,174 @@ class Recording(Rows):
 
     Raises
     ------
-    ValueError : if there is another run in the file, or something else.
+    ValueError : on entering, if there is another run in the file, or something else, or another process writes to it.
     """
 
     def __init__(
         self, problem: Problem, times: NDArray, path: str | Path, about: dict[str, Any], estimate: dict[str, float] | None = None
     ) -> None:
         super().__init__(problem, times)
-        self.path, self.about, self.estimate = Path(path), about, estimate
-        self.restart = self.path.with_name(self.path.name + ".restart")
+        self.path, self.about, self.estimate = archive.named(path), about, estimate
+        self.restart = Restart(self.path)
+        self.told = _told(problem, times, about)
+        self.run = hashlib.sha256(repr(sorted(self.told.items())).encode()).hexdigest()  # names it in the restart file
         self.file: FrameFile | None = None
+        self.step = 0  # of the last restart file
+        self.empty = False  # whether the file was made here, and nothing is in it yet
         self.asked = False  # to stop
         self.due = clock.perf_counter() + SECONDS
-        if self.path.is_dir():
-            raise ValueError(f"{self.path} cannot be written: it is a folder")
-        if self.path.exists():
-            self.file = FrameFile.open(self.path, writable=True)
-            try:
-                self._check(self.file)
-            except BaseException:
-                self.__exit__()
-                raise
-            self.complete = bool(self.file.attrs["complete"])
 
     def __enter__(self) -> "Recording":
+        try:
+            self._open()
+        except BaseException:
+            self._close()
+            raise
         # Ctrl-C is heard between steps, where the memory is whole; the second one at once
         self._handler: Any = None
         if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             self._handler = signal.signal(signal.SIGINT, self._interrupted)
         return self
 
+    def _open(self) -> None:
+        """Take the file, if it is there and of this run."""
+        self.restart.take()
+        if not self.path.exists():
+            return
+        self.file = self.restart.opened()
+        self._check(self.file)
+        if self.restart.kept and str(self.restart.kept.get("run")) != self.run:
+            raise ValueError(f"{self.restart.path} is of another run, or of an earlier version; {FROM_THE_BEGINNING}")
+        self.complete = bool(self.file.attrs["complete"])
+        if not self.complete and not self.restart.held:
+            raise ValueError(f"{self.path} holds a run that is not finished, and {self.restart.path} cannot be written")
+
     def _interrupted(self, number: int, frame: Any) -> None:
         self.asked = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def __exit__(self, *error: object) -> None:
-        if getattr(self, "_handler", None) is not None:
+        if self._handler is not None:
             signal.signal(signal.SIGINT, self._handler)
-        if self.file is not None:
-            self.file.__exit__()
+        self._close()
 
-    def begin(self, march: March) -> int:
+    def _close(self) -> None:
+        if self.file is not None:
+            if self.empty and self.file.same():
+                self.path.unlink()
+            self.file.__exit__()
+        self.restart.close(self.complete)
+
+    def begin(self, march: March, first: Callable[[], dict[str, Any]]) -> int:
         self._started = clock.perf_counter()
-        if self.file is None or not self.restart.exists():
+        if self.file is None:
+            self._create(first())
             return 0
-        kept = read_restart(self.restart)
+        if lacking := [name for name in first() if name not in self.file]:
+            what = f"was begun by an older version, which did not record {', '.join(lacking)}"
+            raise ValueError(f"{self.path} {what}; give another path, or delete it")
+        if not (kept := self.restart.kept):
+            return 0
         try:
+            f = int(kept["frame"])
             march.recall(kept)
-            self.seconds = float(kept["seconds"])
-            return int(kept["frame"])
+            self.seconds, self.step = float(kept["seconds"]), march.step
         except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
-            raise ValueError(f"{_damaged(self.restart)}: {error}") from None
+            raise ValueError(f"{self.restart.path} is damaged; {FROM_THE_BEGINNING}: {error}") from None
+        if (whole := self.file.whole(f)) < f:
+            raise ValueError(
+                f"{self.path} is older than {self.restart.path.name}, which goes on at frame {f}: frame {whole} is not there; "
+                f"{FROM_THE_BEGINNING}"
+            )
+        return f
+
+    def _create(self, found: dict[str, Any]) -> None:
+        """Make the file, with room for all frames that are as the one found."""
+        self.restart.clear()
+        head = archive.header(self.problem, self.times, self.problem.chain.s, self.about, self.estimate, False)
+        shapes = {name: np.shape(value) for name, value in found.items()}
+        with files.fresh(self.path, room(head, shapes)) as new:
+            FrameFile.create(new.name, head, shapes).__exit__()
+            if self.path.exists():
+                raise ValueError(f"{self.path} was made by something else while the run began; give another path")
+        self.file, self.empty = FrameFile.open(self.path, writable=True), True
 
     def write(self, f: int, found: dict[str, Any]) -> None:
-        if self.file is None:
-            self.restart.unlink(missing_ok=True)  # of a run that is no more
-            head = archive.header(self.problem, self.times, self.problem.chain.s, self.about, self.estimate, False)
-            with fresh(self.path) as temporary:
-                FrameFile.create(temporary, head, {name: np.shape(value) for name, value in found.items()}).__exit__()
-            self.file = FrameFile.open(self.path, writable=True)
-        self.file.write(f, found)
+        assert self.file is not None
+        try:
+            self.file.write(f, found)
+        except OSError as error:
+            raise OSError(f"frame {f} of {self.path} cannot be written: {error.strerror}; {self._goes_on()}") from None
+        self.empty = False
 
     def pause(self, f: int, march: March) -> None:
-        if self.file is None or not (self.asked or clock.perf_counter() > self.due):
+        assert self.file is not None
+        if not (self.asked or clock.perf_counter() > self.due):
             return
         started = clock.perf_counter()
+        self._check_place()
         self.file.flush()
-        with fresh(self.restart) as temporary, open(temporary, "wb") as file:
-            np.savez(file, frame=f, seconds=self.seconds + started - self._started, **march.keep())
+        self._keep(f, march, {})
         self.due = clock.perf_counter() + max(SECONDS, 20 * (clock.perf_counter() - started))
         if self.asked:
-            where = f"interrupted at step {march.step}; {self.path} holds {f} of {self.times.size} frames"
-            raise KeyboardInterrupt(f"{where}, and the same call goes on from there")
+            how = "the same call goes on from there" if self.step == march.step else self._goes_on()
+            raise KeyboardInterrupt(
+                f"interrupted at step {march.step}; {self.path} holds {f} of {self.times.size} frames, and {how}"
+            )
 
-    def solution(self, stats: dict[str, Any]) -> Solution:
+    def _keep(self, f: int, march: March, more: dict[str, NDArray]) -> None:
+        """Replace the restart file; its lock goes on with the new one. Where there is no room for it the run goes on."""
+        seconds = self.seconds + clock.perf_counter() - self._started
+        try:
+            self.restart.keep({"run": self.run, "frame": f, "seconds": seconds} | march.keep() | more)
+        except OSError as error:
+            warn(f"{error}; the run goes on, and if it is killed {self._goes_on()}")
+        else:
+            self.step, self.empty = march.step, False
+
+    def _goes_on(self) -> str:
+        """How a run that ends here is gone on with."""
+        return f"the same call goes on from {f'step {self.step}' if self.step else 'the beginning'}"
+
+    def _check_place(self) -> None:
+        assert self.file is not None
+        if not self.file.same():
+            raise OSError(f"{self.path} was deleted or replaced while a run wrote to it, and the run stops; its frames are lost")
+
+    def solution(self, stats: dict[str, Any], march: March | None = None) -> Solution:
         """The run, its file finished, or as it was finished before."""
-        if not self.complete:
-            archive.finish(self.path, stats)
-            self.restart.unlink(missing_ok=True)
-        with FrameFile.open(self.path) as file:
-            return file.solution(self.problem)
+        assert self.file is not None
+        if march is not None:
+            self._check_place()
+            self.file.flush()
+            self._keep(self.times.size, march, outside(self.file))
+            finish(self.file, stats)
+            self.complete = True
+        return self.file.solution(self.problem)
 
     def _check(self, file: FrameFile) -> None:
         """Whether the file is of the same run."""
         if file.problem is None:
             raise ValueError(f"{self.path} holds a field; give another path, or delete it")
-        there, here = (numbers | arrays for numbers, arrays in map(archive.describe, (file.problem, self.problem)))
-        there, here = (
-            {k: v.tobytes() if isinstance(v, np.ndarray) else archive.as_text(v) for k, v in told.items()} for told in (there, here)
-        )
-        for name in SETTINGS:
-            there[name], here[name] = (archive.as_text(told.get(name)) for told in (file.attrs["stats"], self.about))
-        there["frames"], here["frames"] = file.static["time"].tobytes(), self.times.tobytes()
+        there, here = _told(file.problem, file.static["time"], file.attrs["stats"]), self.told
         for name in {**there, **here}:
             one, other = there.get(name), here.get(name)
             if one != other:
-                told = "" if isinstance(one, bytes) or isinstance(other, bytes) else f": {one} there, {other} here"
-                raise ValueError(f"{self.path} holds another run, whose {name} differs{told}; give another path, or delete it")
-        if "phi" in file and "phi_rate" not in file:
-            told = "was begun by an older version, which did not record phi_rate"
-            raise ValueError(f"{self.path} {told}; give another path, or delete it")
+                words = (
+                    ""
+                    if isinstance(one, bytes) or isinstance(other, bytes)
+                    else f": {untrusted.printable(one)} there, {other} here"
+                )
+                raise ValueError(f"{self.path} holds another run, whose {name} differs{words}; give another path, or delete it")
+
+
+def _told(problem: Problem, times: NDArray, stats: dict[str, Any]) -> dict[str, str | bytes]:
+    """All that makes a run what it is, by name: a hash of each array, the rest as text."""
+    numbers, arrays = archive.describe(problem)
+    told = {name: stats.get(name) for name in SETTINGS} | numbers
+    return {name: archive.as_text(value) for name, value in told.items()} | {
+        name: hashlib.sha256(np.ascontiguousarray(value).data).digest() for name, value in (arrays | {"frames": times}).items()
+    }
 
 
 def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> tuple[Integrator, float, dict[str, Any]] | None:
@@ -181,10 +253,16 @@ def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> 
 
     ValueError if it was made for another tolerance.
     """
-    if not Path(path).exists():
+    if not (real := archive.named(path)).exists():
+        files.check_writable(path)
         return None
-    with FrameFile.open(path) as file:
-        stats = file.attrs["stats"]
+    restart = Restart(real)
+    try:
+        restart.take()
+        with restart.opened() as file:
+            stats = file.attrs["stats"]
+    finally:
+        restart.close()
     if tol is not None and stats.get("tol") != tol:
         told = f": {stats.get('tol')} there, {tol} here"
         raise ValueError(f"{path} holds another run, whose tol differs{told}; give another path, or delete it")
@@ -193,16 +271,3 @@ def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> 
         return from_settings(str(stats["settings"])), checks.number("dt", stats["dt"], positive=True), searched
     except (KeyError, ValueError) as error:
         raise ValueError(f"{path} holds no run that can go on: {error}; give another path, or delete it") from None
-
-
-def read_restart(path: Path) -> dict[str, Any]:
-    """What a restart file says, arrays by name; ValueError if it is damaged."""
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as kept:
-            return {name: kept[name] for name in kept.files}
-    except (*DAMAGE, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
-        raise ValueError(f"{_damaged(path)}: {error}") from None
-
-
-def _damaged(path: Path) -> str:
-    return f"{path} is damaged; without it the run starts from the beginning, so delete it"

@@ -197,7 +197,7 @@ def _run(
         if record.complete:
             return record.solution({})
         march = March(problem, integrator, h, compiled, not progress, watch)
-        first = record.begin(march)
+        first = record.begin(march, lambda: _observed(march, 0.0, want, bool(offered)))
         shown.update(march.step)
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)
@@ -212,7 +212,7 @@ def _run(
             told |= {"short_steps": short} | march.remedy()
         if watch is not None:
             told["step_error"] = march.step_error(rest)
-        return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started})
+        return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started}, march)
 
 
 def _observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Coverage-guided fuzzing of everything that reads a file: scenes in TOML, archives, restart files.
+"""Coverage-guided fuzzing of everything that reads a file: scenes in TOML, archives and what `info` says of them, restart files.
 
     pip install atheris
     python tests/fuzz/readers.py -max_total_time=600 -timeout=20 -rss_limit_mb=3000 -len_control=0 -max_len=65536 corpus/
@@ -16,7 +16,9 @@ import atheris
 
 with atheris.instrument_imports(include=["discs", "continuum", "tomllib"]):
     from continuum.files import read_scene
-    from discs import Solution, archive, load, recording, simulate
+    from discs import Solution, load, recording, simulate
+    from discs.command_line import about
+    from discs.restart import read_restart
     from discs.twist import untwisting_chain
 
 FOLDER = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
@@ -32,14 +34,14 @@ def seeds() -> tuple[Solution, bytes, bytes]:
     class Stop(Exception):
         pass
 
-    def stop(path: object, stats: object) -> None:
+    def stop(file: object, stats: object) -> None:
         raise Stop
 
-    recording.SECONDS, finish, archive.finish = -1e9, archive.finish, stop  # type: ignore[assignment]
+    finish, recording.finish = recording.finish, stop  # type: ignore[assignment]
     try:
         simulate(problem, dt=0.05, frames=3, engine="plain", progress=False, checkpoint=FOLDER / "killed.nc")
     except Stop:
-        archive.finish = finish
+        recording.finish = finish
     return run, (FOLDER / "run.nc").read_bytes(), (FOLDER / "killed.nc.restart").read_bytes()
 
 
@@ -68,10 +70,11 @@ def one_input(content: bytes) -> None:
             assert scene.duration > 0
         elif kind == 3:
             path.write_bytes(changed(data, RESTART))
-            recording.read_restart(path)
+            read_restart(path)
         else:
             path.write_bytes(data.ConsumeBytes(1 << 16) if kind == 1 else changed(data, WHOLE))
             found = load(path)
+            assert all(c.isprintable() or c == "\n" for c in about(path))
             for name in QUANTITIES:
                 value = getattr(found, name)
                 assert value.tobytes() == getattr(RUN, name)[: len(value)].tobytes(), name

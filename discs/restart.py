@@ -1,0 +1,88 @@
+"""The restart file beside the file of a run: what the integrator remembers, whose it is, and the lock of who writes."""
+
+import os
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from discs import archive, files
+from discs.finishing import put_back
+from discs.framefile import DAMAGE, FrameFile
+
+FROM_THE_BEGINNING = "without it the run starts from the beginning, so delete it"
+
+
+class Restart:
+    """The restart file of the run at `path`; empty until something is kept, there as long as the run is.
+
+    Attributes
+    ----------
+    path : of the restart file.
+    kept : what it says, by name.
+    held : whether this process has the lock; who has it may write the file of the run.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.run, self.path = path, archive.restart_of(path)
+        self.kept: dict[str, Any] = {}
+        self._fd: int | None = None
+
+    @property
+    def held(self) -> bool:
+        return self._fd is not None
+
+    def take(self) -> None:
+        """Lock the file and read it. ValueError if another process has it, or it is damaged, or none can be made for a new run."""
+        try:
+            self._fd = files.hold(self.path)
+        except BlockingIOError:
+            raise archive.busy(self.run) from None
+        except OSError as error:
+            if not self.run.exists():  # a run that is there can be read all the same
+                raise ValueError(f"{self.run} cannot be written: {error.strerror}") from None
+            return
+        if os.fstat(self._fd).st_size:
+            self.kept = read_restart(self.path)
+
+    def opened(self) -> FrameFile:
+        """The file of the run, as it was before if a kill has torn its end."""
+        try:
+            return FrameFile.open(self.run, writable=self.held)
+        except ValueError:
+            torn = self.held and "bytes" in self.kept and self.run.stat().st_size >= self.kept["ends"][-1, 1]
+            if not torn:
+                raise
+        put_back(self.run, self.kept)
+        return FrameFile.open(self.run, writable=True)
+
+    def keep(self, content: dict[str, Any]) -> None:
+        """Replace the file; the lock goes on with the new one."""
+        assert self._fd is not None
+        with files.fresh(self.path) as new:
+            np.savez(new, **content)
+            held = os.dup(new.fileno())
+        os.close(self._fd)
+        self._fd = held
+
+    def clear(self) -> None:
+        """Empty the file, which is of a run that is no more."""
+        assert self._fd is not None
+        os.ftruncate(self._fd, 0)
+        self.kept = {}
+
+    def close(self, done: bool = False) -> None:
+        """Give the lock back; of a run that is done, or has kept nothing, no file is left."""
+        if self._fd is not None:
+            files.release(self._fd, self.path if done or not os.fstat(self._fd).st_size else None)
+
+
+def read_restart(path: Path) -> dict[str, Any]:
+    """What a restart file says, arrays by name; ValueError if it is damaged."""
+    try:
+        with open(files.opened(path), "rb") as file, np.load(file, allow_pickle=False) as kept:
+            return {name: kept[name] for name in kept.files}
+    except (*DAMAGE, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"{path} is damaged; {FROM_THE_BEGINNING}: {error}") from None

@@ -1,0 +1,393 @@
+"""Whose a file is, what is on the disc when, and what is left behind."""
+
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discs import archive, files, finishing, load, recording, simulate
+from discs.__main__ import main
+from discs.twist import untwisting_chain
+from tests.conftest import Model, uneven
+from tests.discs.test_archive import same
+from tests.discs.test_restart import Stop, equal, stopped
+
+PROBLEM = uneven(7, Model("springs", "field"))
+SETTLED = {"dt": 0.05, "frames": 5, "engine": "plain", "progress": False}
+
+
+def stopped_at(monkeypatch, after, path, problem=PROBLEM, **options):
+    stopped(monkeypatch, after, problem, **{k: v for k, v in (SETTLED | options).items() if k != "progress"}, checkpoint=path)
+
+
+def until(condition, process):
+    """Wait for something that a process does."""
+    while not condition():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+
+
+# One run, one file
+
+
+RUN = ["run", "--n", "40", "--t", "2", "--engine", "plain", "--quiet", "--save"]
+LONG, OTHER, OVERWRITE = ["--dt", "1e-3", "--frames", "401"], ["--dt", "0.5", "--radius", "0.5"], ["--overwrite"]
+
+
+def begun(path, *code):
+    """A long run of another process, which writes to a file."""
+    command = [sys.executable, *(code or ("-m", "discs"))]
+    process = subprocess.Popen([*command, *RUN, str(path), *LONG], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    until(path.exists, process)
+    return process
+
+
+def test_the_second_of_two_runs_on_a_path_is_refused(tmp_path, capsys):
+    path = tmp_path / "run.nc"
+    first = begun(path)
+    for others in (LONG, OTHER, [*OTHER, *OVERWRITE], ["--tol", "0.5", *OVERWRITE]):
+        assert main([*RUN, str(path), *others]) == 2
+        assert "run.nc is being written by another run: wait for its end, or give another path" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="is being written by another run"):
+        simulate(PROBLEM, **SETTLED).save(path)
+    first.communicate()
+    assert first.returncode == 0
+    problem = untwisting_chain(40, duration=2)
+    equal(load(path), simulate(problem, dt=1e-3, frames=401, engine="plain", progress=False))
+    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+
+WITHOUT_LOCKS = (
+    "import sys; from discs import files; from discs.__main__ import main; files.fcntl = None; sys.exit(main(sys.argv[1:]))"
+)
+
+
+def test_without_locks_the_first_run_stops_and_reports_nothing_of_the_second(tmp_path):
+    """As on a file system that has none: another run takes the path."""
+    path = tmp_path / "run.nc"
+    first = begun(path, "-c", WITHOUT_LOCKS)
+    command = [sys.executable, "-c", WITHOUT_LOCKS, *RUN, str(path), *OTHER, *OVERWRITE]
+    second = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert second.returncode == 0, second.stderr
+    said, error = first.communicate(timeout=60)
+    assert first.returncode == 2
+    assert "run.nc was deleted or replaced while a run wrote to it, and the run stops" in error
+    assert not said
+    assert load(path).problem.chain.radius[0] == 0.5
+
+
+def test_a_file_that_is_deleted_meanwhile(tmp_path, monkeypatch):
+    path, solution = tmp_path / "run.nc", recording.Recording.solution
+
+    def deleted(self, *arguments):
+        path.unlink()
+        simulate(PROBLEM, **SETTLED | {"dt": 0.1}).save(tmp_path / "other.nc")
+        os.rename(tmp_path / "other.nc", path)
+        return solution(self, *arguments)
+
+    monkeypatch.setattr(recording.Recording, "solution", deleted)
+    with pytest.raises(OSError, match="was deleted or replaced while a run wrote to it"):
+        simulate(PROBLEM, **SETTLED, checkpoint=path)
+    assert load(path).stats["dt"] == 0.1
+
+
+def test_the_restart_file_of_another_run_is_refused(tmp_path, monkeypatch):
+    a, b = tmp_path / "a.nc", tmp_path / "b.nc"
+    stopped_at(monkeypatch, 9, a)
+    before = a.read_bytes()
+    for other in (
+        {"problem": uneven(7, Model("springs", "field"), seed=2)},
+        {"dt": 0.04},
+        {"frames": [0, 0.3, 0.8]},
+        {"method": "gauss4"},
+    ):
+        b.unlink(missing_ok=True)
+        stopped_at(monkeypatch, 9, b, **other)
+        shutil.copy(f"{b}.restart", f"{a}.restart")
+        with pytest.raises(ValueError, match=r"a\.nc\.restart is of another run, or of an earlier version; .* so delete it"):
+            simulate(PROBLEM, **SETTLED, checkpoint=a)
+        assert a.read_bytes() == before
+    (tmp_path / "a.nc.restart").unlink()
+    equal(simulate(PROBLEM, **SETTLED, checkpoint=a), simulate(PROBLEM, **SETTLED))
+
+
+def test_an_archive_older_than_its_restart_file_is_refused_at_the_beginning(tmp_path, monkeypatch):
+    path = tmp_path / "run.nc"
+    stopped_at(monkeypatch, 9, path)
+    with np.load(f"{path}.restart") as file:
+        kept = dict(file)
+    with open(f"{path}.restart", "wb") as new:
+        np.savez(new, **kept | {"frame": 4})
+    there = load(path).t.size
+    assert 0 < there < 4
+    monkeypatch.setattr("discs.marching.March.to", None)  # not a step
+    message = (
+        rf"run\.nc is older than run\.nc\.restart, which goes on at frame 4: frame {there} is not there; without it the run starts"
+    )
+    with pytest.raises(ValueError, match=message):
+        simulate(PROBLEM, **SETTLED, checkpoint=path)
+
+
+def test_a_run_goes_on_before_its_first_frame(tmp_path, monkeypatch):
+    """It has its file from the start: its end alone takes long, too."""
+    path, options = tmp_path / "run.nc", {"frames": 1}
+    stopped_at(monkeypatch, 9, path, **options)
+    assert path.with_name("run.nc.restart").stat().st_size
+    monkeypatch.setattr("discs.integrators.base.FixedStep.begin", None, raising=False)
+    found = simulate(PROBLEM, **SETTLED | options, checkpoint=path)
+    assert found.stats["steps"] == 20
+    equal(found, simulate(PROBLEM, **SETTLED | options))
+
+
+# The end of a run, and full discs
+
+
+def test_a_kill_in_the_middle_of_the_end_is_put_right(tmp_path, monkeypatch):
+    """Whatever HDF5 had written of what it changes: here half of each byte range."""
+    path, whole = tmp_path / "run.nc", simulate(PROBLEM, **SETTLED)
+
+    def torn(file, stats):
+        before = path.read_bytes()
+        finish(file, stats)
+        after = path.read_bytes()
+        changed = [i for i in range(len(before)) if before[i] != after[i]]
+        half = bytearray(before)
+        for i in changed[: len(changed) // 2]:
+            half[i] = after[i]
+        path.write_bytes(half + b"more")
+        raise Stop
+
+    finish = finishing.finish
+    with monkeypatch.context() as patched:
+        patched.setattr(recording, "finish", torn)
+        patched.setattr(recording.Recording, "_close", lambda self: self.file.__exit__() or self.restart.close())  # as a kill does
+        with pytest.raises(Stop):
+            simulate(PROBLEM, **SETTLED, checkpoint=path)
+    with pytest.raises(ValueError, match="damaged"):
+        load(path)
+    equal(simulate(PROBLEM, **SETTLED, checkpoint=path), whole)
+    equal(load(path), whole)
+    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+
+FULL = """
+import sys, warnings
+from discs import load, simulate
+from discs.twist import untwisting_chain
+problem = untwisting_chain(64)
+settled = dict(dt=0.05, engine="plain", progress=False)
+said = lambda error: print(str(error).replace(sys.argv[1], "DISC"))
+try:
+    simulate(problem, frames=2000, checkpoint=sys.argv[1] + "/big.nc", **settled)
+except ValueError as error:
+    said(error)
+simulate(problem, frames=101, checkpoint=sys.argv[1] + "/run.nc", **settled)  # takes more than half of it
+filler = open(sys.argv[1] + "/filler", "wb", buffering=0)
+try:
+    while True:
+        filler.write(bytes(512))
+except OSError as error:
+    print(error.strerror)
+run = simulate(problem, frames=101, **settled)
+try:
+    run.save(sys.argv[1] + "/run.nc")
+except ValueError as error:
+    said(error)
+assert load(sys.argv[1] + "/run.nc").x.tobytes() == run.x.tobytes()
+"""
+MOUNT = 'mount -t tmpfs -o size=600k tmpfs "$1" && exec "$2" -c "$3" "$1"'
+
+
+def test_a_disc_with_room_for_the_file_once(tmp_path):
+    """A file system of 600 kB: the end of a run needs no room of its own, and what does not fit is refused at the beginning."""
+    unshare = shutil.which("unshare")
+    if not unshare or subprocess.run([unshare, "-rm", "true"], capture_output=True, check=False).returncode:
+        pytest.skip("needs a file system of its own, by unshare -rm")
+    command = [unshare, "-rm", "sh", "-c", MOUNT, "sh", str(tmp_path), sys.executable, FULL]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    big, full, saved = done.stdout.splitlines()
+    assert big == "DISC/big.nc cannot be written: it needs 4.16 MB, and 0.614 MB are free on its disc"
+    assert full == "No space left on device"
+    assert saved.startswith("DISC/run.nc cannot be written: it needs 0.")
+
+
+def test_a_disc_that_fills_up_on_the_way(tmp_path, monkeypatch):
+    """The frames have their room; without restart files the run goes on, says so, and ends as any other."""
+    path, whole = tmp_path / "run.nc", simulate(PROBLEM, **SETTLED)
+
+    def full(*arguments, **named):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(recording, "SECONDS", -np.inf)
+        patched.setattr(np, "savez", full)
+        with pytest.warns(
+            UserWarning, match=r"run\.nc\.restart cannot be written: No space left on device; make room, .* goes on from the beginn"
+        ):
+            found = simulate(PROBLEM, **SETTLED, checkpoint=path)
+    equal(found, whole)
+    path.unlink()
+    with monkeypatch.context() as patched:
+        patched.setattr(files, "write_all", full)
+        message = r"frame 0 of .*run\.nc cannot be written: No space left on device; the same call goes on from the beginning"
+        with pytest.raises(OSError, match=message):
+            simulate(PROBLEM, **SETTLED, checkpoint=path)
+    equal(simulate(PROBLEM, **SETTLED, checkpoint=path), whole)
+
+
+# Where a file may be
+
+
+def test_links_are_followed(tmp_path, monkeypatch):
+    run = simulate(PROBLEM, **SETTLED)
+    (tmp_path / "far").mkdir()
+    link, real = tmp_path / "link.nc", tmp_path / "far" / "real.nc"
+    link.symlink_to(real)
+    run.save(link)  # a link to nothing yet
+    run.save(link)
+    assert link.is_symlink()
+    same(load(real), run)
+    real.unlink()
+    stopped_at(monkeypatch, 9, link)
+    assert (tmp_path / "far" / "real.nc.restart").exists()
+    equal(simulate(PROBLEM, **SETTLED, checkpoint=real), run)
+    assert (
+        main(["run", "--n", "5", "--t", "0.1", "--dt", "0.1", "--engine", "plain", "--quiet", "--overwrite", "--save", str(link)])
+        == 0
+    )
+    assert link.is_symlink()
+    assert load(link).s.size == 5
+    (tmp_path / "loop.nc").symlink_to(tmp_path / "loop.nc")
+    with pytest.raises(ValueError, match=r"loop\.nc cannot be written"):
+        run.save(tmp_path / "loop.nc")
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path):
+    run = simulate(PROBLEM, **SETTLED)
+    os.mkfifo(tmp_path / "pipe.nc")
+    (tmp_path / "null.nc").symlink_to("/dev/null")
+    for name in ("pipe.nc", "null.nc"):
+        with pytest.raises(ValueError, match=f"{name} cannot be written: it is no regular file"):
+            run.save(tmp_path / name)
+        with pytest.raises(ValueError, match=f"{name} cannot be written: it is no regular file"):
+            simulate(PROBLEM, **SETTLED, checkpoint=tmp_path / name)
+        with pytest.raises(ValueError, match=f"{name} cannot be read: it is no regular file"):
+            load(tmp_path / name)
+    for device in ("/dev/null", "/dev/zero"):
+        with pytest.raises(ValueError, match="cannot be written: it is no regular file"):
+            run.save(device)
+        with pytest.raises(ValueError, match="cannot be read: it is no regular file"):
+            load(device)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.nc.gz", "a", "a.npz"])
+def test_other_endings_are_refused(name, tmp_path, capsys):
+    run = simulate(PROBLEM, **SETTLED)
+    message = f"{name} would be a NetCDF-4 file: its name must end in .nc, .nc4, .h5, .hdf5"
+    with pytest.raises(ValueError, match=message):
+        run.save(tmp_path / name)
+    with pytest.raises(ValueError, match=message):
+        simulate(PROBLEM, **SETTLED, checkpoint=tmp_path / name)
+    assert main([*RUN, str(tmp_path / name), *OTHER]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+    run.save(tmp_path / "A.NC4")
+    same(load(tmp_path / "A.NC4"), run)
+
+
+def test_what_a_kill_leaves_of_a_save_is_removed_by_the_next(tmp_path):
+    code = (
+        "import os, sys, signal; from discs import framefile, simulate; from discs.twist import untwisting_chain;"
+        "run = simulate(untwisting_chain(5), dt=0.5, frames=2, engine='plain', progress=False);"
+        "framefile.FrameFile.write = lambda *a: os.kill(os.getpid(), signal.SIGKILL); run.save(sys.argv[1])"
+    )
+    killed = subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.nc")], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    left = list(tmp_path.iterdir())
+    assert len(left) == 1
+    assert left[0].name.startswith(".discs-partial-")
+    with files.fresh(tmp_path / "other.txt"):  # not what another one writes at the time
+        simulate(PROBLEM, **SETTLED).save(tmp_path / "b.nc")
+        assert len(list(tmp_path.iterdir())) == 2
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["b.nc", "other.txt"]
+
+
+# What has reached the disc when
+
+
+def test_everything_is_on_the_disc_before_it_counts(tmp_path, monkeypatch):
+    """A new file's content before its name, its name before anything rests on it; frames before a restart file that skips them."""
+    path, happened, real = tmp_path / "run.nc", [], {name: getattr(os, name) for name in ("fsync", "replace")}
+
+    def fsync(fd):
+        found = Path(os.readlink(f"/proc/self/fd/{fd}")).name
+        happened.append(("disc", "new" if found.startswith(files.PARTIAL) else found))
+        real["fsync"](fd)
+
+    def replace(old, new):
+        happened.append(("name", Path(new).name))
+        real["replace"](old, new)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "replace", replace)
+    folder = tmp_path.name
+
+    def whole(name):
+        return [("disc", "new"), ("name", name), ("disc", folder)]
+
+    run = simulate(PROBLEM, **SETTLED)
+    run.save(path)
+    assert happened == whole("run.nc")
+    path.unlink()
+    happened.clear()
+    monkeypatch.setattr(recording, "SECONDS", -np.inf)
+    simulate(PROBLEM, **SETTLED, checkpoint=path)
+    assert happened[:3] == whole("run.nc")
+    pause = [("disc", "run.nc"), *whole("run.nc.restart")]
+    steps, end = happened[3:-1], happened[-1]
+    assert len(steps) >= 2 * len(pause)
+    assert steps == pause * (len(steps) // len(pause))  # the last of them keeps what the end changes
+    assert end == ("disc", "run.nc")
+
+
+# Files of earlier versions
+
+
+OLD = Path(__file__).parent / "data"
+
+
+def test_archives_of_earlier_versions_open(tmp_path):
+    run = load(OLD / "version-0.1.nc")
+    here = simulate(run.problem, "leapfrog", 0.01, 3, engine="plain", progress=False)
+    np.testing.assert_allclose(run.x, here.x, rtol=0, atol=1e-14)
+    assert run.stats["settings"] == "Leapfrog()"
+    shutil.copy(OLD / "version-0.1.nc", tmp_path / "run.nc")
+    again = simulate(run.problem, "leapfrog", 0.01, 3, engine="plain", progress=False, checkpoint=tmp_path / "run.nc")
+    same(again, run)
+
+
+def test_frames_of_earlier_versions_are_gone_on_with(tmp_path, monkeypatch):
+    """An archive without room for its stats, and a restart file that does not say whose it is."""
+    path = tmp_path / "run.nc"
+    monkeypatch.setattr(archive, "STATS_ROOM", 0)
+    stopped_at(monkeypatch, 9, path)
+    with np.load(f"{path}.restart") as file:
+        kept = {name: file[name] for name in file.files if name != "run"}
+    with open(f"{path}.restart", "wb") as new:
+        np.savez(new, **kept)
+    with pytest.raises(
+        ValueError, match="is of another run, or of an earlier version; without it the run starts from the beginning"
+    ):
+        simulate(PROBLEM, **SETTLED, checkpoint=path)
+    os.unlink(f"{path}.restart")
+    whole = simulate(PROBLEM, **SETTLED)
+    equal(simulate(PROBLEM, **SETTLED, checkpoint=path), whole)
+    equal(load(path), whole)
