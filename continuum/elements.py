@@ -15,24 +15,20 @@ inertia is diagonal and the energy of the sums is constant. n . (e psi)' is kept
 DOP853 with an error far below that of the elements. This shares nothing with the chain but the equations.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import lcm
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from tqdm import tqdm
 
-from continuum.bounds import missed, over
+from continuum.initial import resolve
+from continuum.pieces import POINTS
 from continuum.rod import Scene, SteeredRod
-from discs import Solution
 
 DEGREE = 10
-COUNTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # of elements
-PLACES = 1024  # of a solution, or a multiple
+MOST_CALLS = 12 * 2**17  # of rates, twelve to a step
 UNKNOWNS = ("x", "y", "theta", "phi", "omega", "phi_rate")
 
 
@@ -67,6 +63,11 @@ class Elements:
         x, w, d = lobatto(DEGREE)
         half = self.scene.rod.length / self.count / 2
         return x, w * half, d / half
+
+    @cached_property
+    def _expand(self) -> NDArray:
+        """Values at an element's nodes to Legendre coefficients, (DEGREE + 1, DEGREE + 1)."""
+        return np.linalg.inv(legendre.legvander(self._rule[0], DEGREE))
 
     @cached_property
     def _index(self) -> NDArray:
@@ -150,61 +151,46 @@ class Elements:
         out[5] = force[3] / (rod.heading_inertia * self.weights)
         return out.ravel()
 
+    @cached_property
+    def start(self) -> NDArray:
+        """The unknowns of the initial fields, (6, n)."""
+        fields = self.scene.fields(self.s)
+        return np.stack([fields[name] for name in UNKNOWNS])
+
+    @cached_property
+    def misfit(self) -> dict[str, float]:
+        """Largest distance of the initial fields from their polynomials on the elements, on all pieces where they are smooth."""
+        s, _ = resolve(self.scene).quadrature(POINTS)
+        truth = self.scene.fields(s)
+        at = s / self.scene.rod.length * self.count
+        element = np.minimum(at.astype(int), self.count - 1)
+        values = np.concatenate([self.local(self.start), self.start[4:, self._index]]) @ self._expand.T
+        found = np.einsum("fsk,sk->fs", values[:, element], legendre.legvander(2 * (at - element) - 1, DEGREE))
+        return {name: float(np.abs(row - truth[name]).max()) for name, row in zip(UNKNOWNS, found, strict=True)}
+
     def run(self, times: NDArray, tol: float) -> NDArray:
         """The unknowns at the times, (F, 6, n), with an error in time below tol."""
-        fields = self.scene.fields(self.s)
-        start = np.stack([fields[name] for name in UNKNOWNS])
+        calls = 0
+
+        def rate(t: float, flat: NDArray) -> NDArray:
+            nonlocal calls
+            calls += 1
+            if calls > MOST_CALLS:
+                raise ValueError(
+                    f"tol is not reached in {MOST_CALLS // 12} time steps of {self.count} elements, which end at t = {t:.4g}: "
+                    "ask for a larger tol or a shorter duration"
+                )
+            return self.rate(t, flat)
+
         span = 0.0, max(float(times[-1]), 1e-300)
-        found = solve_ivp(self.rate, span, start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
+        found = solve_ivp(rate, span, self.start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
         if not found.success:
             raise ValueError(f"the field could not be integrated: {found.message}")
         return found.y.T.reshape(len(times), 6, -1)
 
     def sample(self, q: NDArray, cells: int) -> NDArray:
         """Rows x, y, theta, phi, theta., phi. of (6, n) at equally spaced places, `cells` of them to an element, (6, places)."""
-        x = self._rule[0]
-        fine = np.linspace(-1, 1, cells, endpoint=False)
-        through = legendre.legvander(fine, DEGREE) @ np.linalg.inv(legendre.legvander(x, DEGREE))
+        through = legendre.legvander(np.linspace(-1, 1, cells, endpoint=False), DEGREE) @ self._expand
         values = np.concatenate([self.local(q), q[4:, self._index]])
         places = (values @ through.T).reshape(6, -1)
         return places if self.scene.closed else np.column_stack([places, q[:, -1]])
-
-
-def solve_elements(scene: Scene, bound: Mapping[str, float], times: NDArray, progress: bool) -> Solution:
-    """The fields within bounds by name, their error measured on more elements.
-
-    Elements are added until the next number of them changes nothing by more than the tolerance. That change, and a half for what
-    the finer one errs itself (a third of it or less: 4/3 the elements divide the error by 3 to 20 on the twisted rod), is the
-    error of the coarser one, which is the solution.
-
-    Returns
-    -------
-    Solution on equally spaced nodes, a multiple of 1024 to the length.
-    """
-    tol = min(bound.values())
-    rest = min(tol / 100, 1e-7)  # of the steps, far below what even the fewest elements err
-    with tqdm(desc=f"field to {tol:g}", unit="run", delay=1, disable=not progress) as bar:
-        fine = Elements(scene, COUNTS[0])
-        after = fine.run(times, rest)
-        for count in COUNTS[1:]:
-            bar.update()
-            system, found, fine = fine, after, Elements(scene, count)
-            after = fine.run(times, rest)
-            places = lcm(PLACES, system.count, fine.count)
-            values, finer = (
-                np.stack([e.sample(q, places // e.count) for q in frames], axis=1) for e, frames in ((system, found), (fine, after))
-            )
-            changes = np.abs(values - finer).max(axis=(1, 2))
-            error = {name: 1.5 * float(change) + rest for name, change in zip(UNKNOWNS, changes, strict=True)}
-            if over(error, bound) <= 1:
-                break
-        else:
-            raise ValueError(missed(error, bound, f"on {system.n} nodes"))
-    return Solution(
-        t=times,
-        s=scene.rod.length / places * np.arange(values.shape[-1]),
-        energy=np.array([system.energy(q) for q in found]),
-        stats={"method": "elements", "order": DEGREE, "elements": system.count, "nodes": system.n, "dt": None},
-        error_estimate=error,
-        **dict(zip(UNKNOWNS, values, strict=True)),
-    )

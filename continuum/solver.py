@@ -9,9 +9,9 @@ from scipy.interpolate import CubicSpline
 from tqdm import tqdm
 
 from continuum.bounds import FIELDS, bounds, missed, over
-from continuum.elements import solve_elements
 from continuum.initial import resolve
 from continuum.mesh import semidiscretise
+from continuum.refinement import solve_elements
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
 from continuum.told import tells_scene

@@ -201,3 +201,78 @@ def test_bad_steered_rods_are_refused():
             compute()
     with pytest.raises(ValueError, match="method must be one of 'elements'; got 'leapfrog'"):
         solve(steered_rod(), method="leapfrog")
+
+
+def bumped(theta, omega=None, **options):
+    """A straight rod with headings of its own, at rest but for these."""
+    none = np.zeros_like
+    start = omega or none
+    rod = steered_rod(duration=1.0, **options)
+    return replace(rod, initial=lambda s: (s, rod.rod.radius * theta(s), theta(s), start(s), none(s), none(s)))
+
+
+def test_narrow_bump_by_linear_waves():
+    """A bump of width length/130, 1e-3 of its height asked for: exact waves of small amplitude, on a closed rod.
+
+    With y = R theta a wave theta = a cos(q s), phi = b sin(q s) has V = beta q^2 a^2/2 + G (R q a + b)^2/2 + K q^2 b^2/2.
+    """
+    height, width = 1e-4, 4.0 / 130
+    scene = bumped(lambda s: height * np.exp(-(((s - 2.13) / width) ** 2)), radius=0.7)
+    scene = replace(scene, closed=True, shift=(4.0, 0.0))
+    field = solve(scene, 1e-3 * height, frames=3, progress=False)
+    rod, shear = scene.rod, 10.0
+    q = 2 * np.pi / rod.length * np.arange(300)
+    a0 = height * width * np.sqrt(np.pi) / rod.length * np.exp(-((q * width / 2) ** 2)) * np.where(q > 0, 2, 1)
+    for f, t in enumerate(field.t):
+        theta = np.zeros_like(field.s)
+        for wave, a in zip(q, a0, strict=True):
+            twist = rod.torsion_stiffness * wave**2 + shear * (rod.radius * wave) ** 2
+            stiffness = np.array(
+                [[twist, shear * rod.radius * wave], [shear * rod.radius * wave, shear + rod.bending_stiffness * wave**2]]
+            )
+            root = np.sqrt([rod.inertia, 0.25])
+            squares, modes = np.linalg.eigh(stiffness / np.outer(root, root))
+            moved = modes @ (np.cos(np.sqrt(np.maximum(squares, 0)) * t) * (modes.T @ [a * root[0], 0])) / root
+            theta += moved[0] * np.cos(wave * (field.s - 2.13))
+        error = np.abs(field.theta[f] - theta).max()
+        assert error <= 1e-3 * height
+        assert error <= field.error_estimate["theta"]
+    assert np.abs(field.theta[0]).max() > 0.99 * height
+
+
+def test_corner_s_error_is_measured(monkeypatch):
+    """A corner of theta sends out corners: errors fall like 1/elements and not like the 10th power, and the estimate says so."""
+    scene = replace(bumped(lambda s: 0.2 * np.abs(s - 2.13)), duration=0.1)
+    field = solve(scene, 5e-3, frames=3, progress=False)
+    elements = Elements(scene, 64)
+    truth = np.stack([elements.sample(q, (field.s.size - 1) // 64) for q in elements.run(field.t, 1e-6)], axis=1)
+    for row, name in enumerate(("x", "y", "theta", "phi")):
+        assert np.abs(getattr(field, name) - truth[row]).max() <= field.error_estimate[name] <= 5e-3
+    monkeypatch.setattr("continuum.refinement.COUNTS", (16, 24, 32, 48, 64))
+    with pytest.raises(ValueError, match=r"tol = 0\.001 is not reached on 241 nodes, .*: .* a corner at s = 2\.13, .* round it"):
+        solve(scene, 1e-3, frames=2, progress=False)
+
+
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        (
+            bumped(lambda s: np.exp(-(((s - 2.13) / 1e-3) ** 2))),
+            r"do not hold the initial fields: they vary within 0.001 at s = 2.13",
+        ),
+        (
+            bumped(np.zeros_like, lambda s: np.exp(-(((s - 1.5) / 1e-3) ** 2))),
+            r"they vary within 0.001 at s = 1.5; take fields varying",
+        ),
+        (bumped(lambda s: 1.0 * (s > 2.13)), r"initial theta jumps by 1 at s = 2.13"),
+    ],
+)
+def test_data_that_elements_do_not_hold(scene, message):
+    with pytest.raises(ValueError, match=message):
+        solve(scene, 1e-3, progress=False)
+
+
+def test_steps_of_elements_are_bounded(monkeypatch):
+    monkeypatch.setattr("continuum.elements.MOST_CALLS", 1200)
+    with pytest.raises(ValueError, match=r"tol is not reached in 100 time steps of 1 elements.*larger tol or a shorter duration"):
+        solve(steered_rod(duration=1e5), 1e-3, progress=False)

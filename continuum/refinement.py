@@ -1,0 +1,133 @@
+"""Fields of sections with headings of their own to a tolerance: more and more elements, the error measured."""
+
+from collections.abc import Mapping, Sequence
+from math import lcm
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from continuum.bounds import LEAST, missed, over
+from continuum.elements import DEGREE, UNKNOWNS, Elements
+from continuum.initial import resolve
+from continuum.rod import Scene
+from discs import Solution
+
+RATES = ("omega", "phi_rate")
+MOST = 8.0  # times what more elements change: larger errors are not told from it
+COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # of elements
+PLACES = 1024  # of a solution, or a multiple
+
+
+class Found(NamedTuple):
+    """A motion on elements at times (F,): unknowns (F, 6, n)."""
+
+    elements: Elements
+    q: NDArray
+
+    def sample(self, places: int) -> NDArray:
+        """The unknowns at equally spaced places, a multiple of the elements, (6, F, places)."""
+        return np.stack([self.elements.sample(q, places // self.elements.count) for q in self.q], axis=1)
+
+
+def solve_elements(scene: Scene, bound: Mapping[str, float], times: NDArray, progress: bool) -> Solution:
+    """The fields within bounds by name, their error measured on more elements.
+
+    The first elements are as many as hold the initial fields: what is bound within its bound, other fields to a tenth. They are
+    added until the next number of them changes nothing by more than the bounds. If errors fall like count^-p, the error of the
+    coarser of two counts c < C, which is the solution, is
+
+        (what C elements change)/(1 - (c/C)^p),
+
+    p from the changes themselves (`falls`): at least 1.5 times the change, at most `MOST` times. Smooth data have p of 4 and more;
+    a corner sends out corners, and there p is taken as 1 at most. The error is also at least that of the initial fields.
+
+    Returns
+    -------
+    Solution on equally spaced nodes, a multiple of 1024 to the length.
+    """
+    rest = min(1e-7, *(limit / (1e4 if name in RATES else 1e2) for name, limit in bound.items()))  # of the steps, in angles
+    first = next((i for i, count in enumerate(COUNTS) if _holds(Elements(scene, count), bound)), len(COUNTS))
+    counts = COUNTS[first:]
+    if len(counts) < 3:
+        raise ValueError(
+            f"tol is not reached on {COUNTS[-1]} elements, as these do not hold the initial fields: {_sharpest(scene)}; "
+            f"take fields varying over length/{COUNTS[-1] // 4} = {4 * scene.rod.length / COUNTS[-1]:.2g} or more, or a larger tol"
+        )
+    runs: list[Found] = []
+    changes: list[NDArray] = []
+    with tqdm(desc=f"field to {min(bound.values()):g}", unit="run", delay=1, disable=not progress) as bar:
+        for count in counts:
+            system = Elements(scene, count)
+            bar.set_postfix(elements=count, refresh=False)
+            runs = [*runs[-1:], Found(system, system.run(times, rest))]
+            bar.update()
+            if len(runs) < 2:
+                continue
+            places = lcm(PLACES, *(run.elements.count for run in runs))
+            values, finer = (run.sample(places) for run in runs)
+            changes.append(np.abs(values - finer).max(axis=(1, 2)))
+            if len(changes) < 2:
+                continue
+            found = runs[0].elements
+            last, smooth = counts.index(count), not resolve(scene).kinks
+            factors = falls(np.array(changes[-3:]), counts[last - len(changes[-3:]) : last + 1], np.inf if smooth else 1.0)
+            estimates = zip(UNKNOWNS, factors * changes[-1] + rest, strict=True)
+            error = {name: max(float(estimate), found.misfit[name]) for name, estimate in estimates}
+            if over(error, bound) <= 1:
+                break
+            if count == counts[-1] or _hopeless(scene, over(error, bound), found.count):
+                raise ValueError(missed(error, bound, f"on {found.n} nodes") + _corners(scene))
+    return Solution(
+        t=times,
+        s=scene.rod.length / places * np.arange(values.shape[-1]),
+        energy=np.array([found.energy(q) for q in runs[0].q]),
+        stats={"method": "elements", "order": DEGREE, "elements": found.count, "nodes": found.n, "dt": None},
+        error_estimate=error,
+        **dict(zip(UNKNOWNS, values, strict=True)),
+    )
+
+
+def falls(changes: NDArray, counts: Sequence[int], most: float) -> NDArray:
+    """Errors of the last count but one over its change, (6,), from two or three changes (m, 6) between counts (m + 1,).
+
+    `most` is the largest order p.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p = np.log(changes[0] / changes[-1]) / np.log(counts[-2] / counts[-len(changes) - 1])
+        factor = 1 / (1 - (counts[-2] / counts[-1]) ** np.clip(np.nan_to_num(p), 1e-3, most))
+    return np.clip(factor, 1.5, MOST)
+
+
+def _hopeless(scene: Scene, times: float, count: int) -> bool:
+    """Whether errors so many times the bounds will not be mended: with corners they fall like 1/count^2 at best."""
+    return bool(resolve(scene).kinks) and times * (count / COUNTS[-2]) ** 2 > 1
+
+
+def _corners(scene: Scene) -> str:
+    """What to add of initial fields that have corners; empty of others."""
+    kinks = resolve(scene).kinks
+    return f": the initial fields have a corner at s = {kinks[0]:.4g}, which the motion keeps; round it" if kinks else ""
+
+
+def _sharpest(scene: Scene) -> str:
+    """Where initial fields vary most, in words."""
+    features = resolve(scene).features
+    if not features:
+        return "they have corners" if resolve(scene).kinks else "they vary too fast"
+    place, width = min(features, key=lambda feature: feature[1])
+    return f"they vary within {width:.2g} at s = {place:.4g}"
+
+
+def _holds(system: Elements, bound: Mapping[str, float]) -> bool:
+    """Whether the initial fields are there on the elements: what is bound within its bound, other fields to a tenth."""
+    scene = system.scene
+    unit = {"x": scene.rod.length, "y": scene.rod.length, "omega": 1 / scene.duration, "phi_rate": 1 / scene.duration}
+    for name, misfit in system.misfit.items():
+        size = float(np.ptp(system.start[UNKNOWNS.index(name)])) / 2
+        rounding = LEAST * unit.get(name, 1.0)
+        small = max(size / 10, min(bound.values()) / scene.duration) if name in RATES else size / 10
+        if misfit > bound.get(name, small) + rounding:
+            return False
+    return True
