@@ -15,6 +15,7 @@ from discs import Midpoint, SimulationError, Suzuki4, simulate
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.8, "radius": 0.7, "length": 3.1}
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
+LONG = pytest.mark.filterwarnings("ignore:midpoint. dt = .* is too long for this motion")  # stability in long steps is tested
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +123,7 @@ def test_waves_of_the_straight_rod(branch, omega):
     assert elements.n == 4 * DEGREE
 
 
+@LONG
 def test_rolling_chain_does_not_grow():
     """A rough small perturbation of the rolling straight chain stays small for a long time."""
     rod = steered_rod(9.0, 7.0, 0.3, **UNEVEN).rod
@@ -150,6 +152,7 @@ def test_circle_of_own_headings():
     assert study.order[:, :3] == pytest.approx(2.0, abs=0.05), study.table()  # phi is exact by symmetry
 
 
+@LONG
 @pytest.mark.parametrize("multiple", [1, 4, 16])
 def test_energy_over_a_long_time(multiple):
     problem = lump(steered_rod(duration=150.0), 129)
