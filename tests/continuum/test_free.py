@@ -44,7 +44,7 @@ def orders(errors):
 
 def moving(n, dt, closed=False, frames=2, duration=1.5, theta=0.0, omega=0.0):
     r0, v0 = (circle, ringing) if closed else (straight, whip)
-    return free_rod(ROD, r0, v0, theta, omega, duration, n, dt, closed, frames, progress=False)
+    return free_rod(ROD, r0, v0, theta, omega, duration, n, dt, closed, frames, progress=False, estimate=False)
 
 
 @pytest.mark.parametrize("closed", [False, True])
@@ -80,7 +80,7 @@ def test_energy_does_not_drift():
 def test_step_is_reversible():
     run = moving(34, 0.02)
     here = [np.array([getattr(run, name)[-1] for name in names]) for names in (("x", "y"), ("x_rate", "y_rate"))]
-    back = free_rod(ROD, here[0], -here[1], run.theta[-1], -run.omega[-1], 1.5, 34, 0.02, frames=1, progress=False)
+    back = free_rod(ROD, here[0], -here[1], 0.0, 0.0, 1.5, 34, 0.02, frames=1, progress=False, estimate=False)
     np.testing.assert_allclose(np.stack([back.x[0], back.y[0]]), straight(run.s), atol=1e-9)
     np.testing.assert_allclose(np.stack([back.x_rate[0], back.y_rate[0]]), -np.stack([run.x_rate[0], run.y_rate[0]]), atol=1e-8)
 
@@ -149,7 +149,7 @@ def test_small_bending_is_a_free_free_beam(mode):
     errors = []
     for n in (17, 33, 65):
         dt = 2 / omega / (n - 1)
-        run = free_rod(ROD, straight, velocity, 0.0, 0.0, 2 / omega, n, dt, frames=5, progress=False)
+        run = free_rod(ROD, straight, velocity, 0.0, 0.0, 2 / omega, n, dt, frames=5, progress=False, estimate=False)
         truth = 1e-5 * shape(run.s) * np.sin(omega * run.t)[:, None] / omega
         errors.append(np.abs(run.y - truth).max() / np.abs(truth).max())
     assert orders(errors) == pytest.approx(2.0, abs=0.1), errors
@@ -165,7 +165,8 @@ def test_small_swing_of_the_inextensible_ring(mode):
 
     errors = []
     for n in (24, 48, 96):
-        run = free_rod(ROD, circle, velocity, 0.0, 0.0, 2 / omega, n, 2 / omega / n, closed=True, frames=5, progress=False)
+        dt = 2 / omega / n
+        run = free_rod(ROD, circle, velocity, 0.0, 0.0, 2 / omega, n, dt, True, frames=5, progress=False, estimate=False)
         outwards = np.hypot(run.x, run.y) - np.hypot(*circle(run.s))
         truth = 1e-5 * np.cos(mode * run.s / A) * np.sin(omega * run.t)[:, None] / omega
         errors.append(np.abs(outwards - truth).max() / np.abs(truth).max())
@@ -243,15 +244,22 @@ def test_frames_do_not_change_the_motion():
     [
         ({"rod": "a rod"}, "free_rod needs a Rod with curvature='linear'; got 'a rod'"),
         ({"rod": Rod(**vars(ROD) | {"spin_inertia": 0.0})}, "the free rod needs a positive spin_inertia"),
-        ({"r0": lambda s: 1.02 * straight(s)}, r"r0 must have \|r0'\| = 1; got 1.02 between nodes"),
+        ({"r0": lambda s: 1.02 * straight(s)}, r"r0 must have \|r0'\| = 1, s being its arc length; got 1.02 at s = "),
         ({"r0": np.zeros(9)}, r"r0 must give x and y, an array of shape \(2, 9\); got shape \(9,\)"),
-        ({"v0": lambda s: 0.3 * straight(s)}, "v0 must not stretch the rod, r0'.v0' = 0; got 0.3 between nodes"),
+        ({"v0": lambda s: 0.3 * straight(s)}, "v0 must not stretch the rod, r0'.v0' = 0; got 0.3 at s = "),
         ({"v0": np.full((2, 9), np.nan)}, "v0 must be finite; got nan"),
         ({"theta0": np.zeros(4)}, r"theta0 must be a number or an array of shape \(9,\); got shape \(4,\)"),
         ({"omega0": lambda s: 1 / s}, "omega0 must be finite"),
         ({"duration": 0.0}, "duration must be a positive"),
         ({"n": 2}, "n .* must be a whole number of at least 3"),
         ({"dt": 0.0}, "dt must be a positive"),
+        ({"dt": 1.1}, "dt must be at most the duration, 1; got 1.1"),
+        ({"dt": 1e300}, "dt must be at most the duration"),
+        ({"dt": 1e-300}, "more than can be counted: take a larger dt"),
+        ({"n": 10**7}, "n must be at most 1000000 nodes; got 10000000"),
+        ({"r0": lambda s: np.zeros((2, 9))}, r"r0 must give x and y, an array of shape .* where s has shape \(104,\)"),
+        ({"omega0": 1e200}, "r0, v0, theta0 and omega0 are too large: their energy is not a finite number"),
+        ({"estimate": 1}, "estimate must be True or False; got 1"),
         ({"closed": "yes"}, "closed must be True or False; got 'yes'"),
         ({"frames": [2.0]}, "frames must be increasing times within"),
     ],
@@ -266,3 +274,9 @@ def test_bad_input_is_refused(change, message):
 def test_a_step_that_cannot_be_solved_says_so():
     with pytest.raises(SimulationError, match="take a smaller dt than 5"):
         moving(17, 50.0, duration=50.0)
+
+
+def test_a_time_within_rounding_of_the_end_is_a_frame():
+    frames = np.arange(0, 0.35, 0.1)
+    assert frames[-1] > 0.3
+    np.testing.assert_array_equal(moving(9, 0.05, duration=0.3, frames=frames).t, np.minimum(frames, 0.3))
