@@ -10,6 +10,8 @@ from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
 from compare.stability_table import Stability, kept, stability
+from compare.sweeps import read
+from compare.trust import Trust, gathered, trust
 from continuum import steered_rod, untwisting_rod
 from continuum.files import read_scene
 from discs import command_line
@@ -47,8 +49,49 @@ def parser() -> argparse.ArgumentParser:
         commands.add_parser("precision", help="speed against error beside other integrators", description=precision.__doc__)
     )
     add_stability(commands.add_parser("stability", help="hard cases by every method", description=stability.__doc__))
+    add_trust(commands.add_parser("trust", help="random scenes: whether tolerances are kept", description=trust.__doc__))
     add_report(commands.add_parser("report", help="everything on one page", description=report.__doc__))
     return p
+
+
+def add_trust(p: argparse.ArgumentParser) -> None:
+    """The options of `trust`."""
+    p.add_argument("--out", metavar="DIR", default="out", help="folder for trust.md and trust.csv (default: out)")
+    p.add_argument("--scenes", metavar="M", type=int, default=200, help="how many, their kinds take turns (default: 200)")
+    p.add_argument("--seed", metavar="SEED", type=int, default=0, help="of scenes and tolerances (default: 0)")
+    p.add_argument("--first", metavar="I", type=int, default=0, help="number of the first scene (default: 0)")
+    p.add_argument(
+        "--seconds",
+        metavar="S",
+        type=float,
+        default=60.0,
+        help="processor time for one run, s; references four times (default: 60)",
+    )
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
+    p.set_defaults(run=run_trust)
+
+
+def run_trust(options: argparse.Namespace) -> None:
+    """Run random scenes and write the table; what an interrupted run has found is written too, and the same command goes on."""
+    archive = Path(options.out) / "trust.jsonl"
+    try:
+        found = trust(options.scenes, options.seed, options.first, options.seconds, archive=archive, progress=not options.quiet)
+    except KeyboardInterrupt:
+        if archive.exists():
+            write_trust(gathered(read(archive)), options.out)
+            print(f"interrupted: {options.out} holds what was found; the same command goes on", file=sys.stderr)
+        raise
+    write_trust(found, options.out)
+    archive.unlink()  # a later run measures again
+    print(found.summary())
+    print(f"\nwritten to {options.out}: trust.md, trust.csv")
+
+
+def write_trust(found: Trust, out: str) -> None:
+    """Table and rows."""
+    with fresh_files(out) as folder:
+        found.save(folder / "trust.csv")
+        (folder / "trust.md").write_text(f"# Random scenes\n\n{found.summary()}\n\n{found.table()}\n", encoding="utf-8")
 
 
 def add_report(p: argparse.ArgumentParser) -> None:

@@ -1,0 +1,358 @@
+"""Whether tolerances are kept: random scenes by `solve` and by `simulate(..., "auto")`, against references of another kind.
+
+A scene is drawn (`compare.random_scenes`), and a tolerance for each of the two. What they find is held against
+
+* chains : N discs, 2N and 4N, with ends of second order, extrapolated by the law 1/N^2: another discretisation. Their error is the
+  change from one extrapolation to the next over three (`continuum.solver`), and that of their steps. They reach 1e-4 to 1e-6.
+* finer : where chains err by more than a fifth of the tolerance, the field itself to a thirtieth of it. It is another run and not
+  another kind, so chains are compared too: `unlike` says by how many times their own error they differ from it.
+* gauss8 : of discs, "gauss8" with steps eight times shorter; its error is what steps four times shorter change.
+
+A reference that errs by more than a fifth of the tolerance is none, and the row says so. A run is given so many seconds of
+processor time, and is cut off after.
+"""
+
+import csv
+import re
+import signal
+import time as clock
+import warnings
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import shorten
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from compare.lump import lump
+from compare.random_scenes import Drawn, random_scene
+from compare.sweeps import Result, sweep
+from continuum import Scene, solve
+from discs import Gauss8, SimulationError, Solution, checks, simulate
+
+FRAMES = 6
+SIZES = (128, 256, 512)  # links of the chains of a reference
+LEAST = 5.0  # a reference errs by at most the tolerance over this
+KNOWN = 3.0  # an error below this many times the reference's own is not told from it: it has no ratio
+HIGH, MOST = 5.0, 20.0  # estimates over errors: nine in ten at most the first, all at most the second
+OUTCOMES = ("within", "ABOVE", "refused", "cut off", "no reference")
+
+
+class Row(NamedTuple):
+    """A scene by `solve` or `simulate`.
+
+    scene : seed and index. kind, law, words, duration : of the scene; words of its initial fields. by : "solve" or "simulate".
+    tol : asked for; of fields absolute, of discs relative to the largest value of each. outcome : one of OUTCOMES.
+    error, estimate : largest over positions and angles, as tol counts them; NaN where unknown. ratio : estimate over error, NaN
+    where the error is too small to be known. seconds : processor time. reference, reference_error : what it is held against.
+    unlike : by how many times their own error chains differ from the finer field. says : the refusal's words, or warnings.
+    shown : of a refusal, what chains do.
+    """
+
+    scene: str
+    kind: str
+    law: str
+    words: str
+    duration: float
+    by: str
+    tol: float
+    outcome: str
+    error: float = np.nan
+    estimate: float = np.nan
+    ratio: float = np.nan
+    seconds: float = np.nan
+    reference: str = ""
+    reference_error: float = np.nan
+    unlike: float = np.nan
+    says: str = ""
+    shown: str = ""
+
+
+class TimeUp(BaseException):
+    """The processor time is used up; not an `Exception`, so that nothing on the way takes it for a failure."""
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """Raise `TimeUp` after so much processor time of this process; where there is no such clock (Windows) never."""
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def up(*_: object) -> None:
+        raise TimeUp
+
+    before = signal.signal(signal.SIGPROF, up)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def examine(case: list[float]) -> list[list[Any]]:
+    """The two rows of a case [seed, index, seconds]: called in other processes."""
+    seed, index, seconds = int(case[0]), int(case[1]), float(case[2])
+    drawn = random_scene(seed, index)
+    rng = np.random.default_rng([seed, index, 1])
+    tolerances = 10 ** -rng.uniform(2, 7, 2)
+    begin = Row(f"{seed}:{index}", drawn.kind, drawn.scene.rolling, drawn.words, drawn.scene.duration, "", np.nan, "")
+    if drawn.scene.steered:
+        begin = begin._replace(law="own")
+    by = (field_row, "solve"), (discs_row, "simulate")
+    rows = []
+    for (found, name), tol in zip(by, tolerances.tolist(), strict=True):
+        blank = begin._replace(by=name, tol=float(f"{tol:.1e}"))
+        rows.append(list(found(drawn, blank, seconds)))
+    return rows
+
+
+def field_row(drawn: Drawn, row: Row, seconds: float) -> Row:
+    """The field of a scene by `solve`."""
+    scene = drawn.scene
+    found, row = _tried(lambda: solve(scene, row.tol, frames=FRAMES, progress=False), row, seconds)
+    if found is None:
+        return row._replace(shown=_chains_end(drawn, seconds)) if row.outcome == "refused" else row
+    names = ["x", "y", "theta", *(["phi"] if scene.steered else [])]
+    estimate = max((found.error_estimate or {})[name] for name in names)
+    row = row._replace(estimate=estimate)
+    try:
+        with at_most(2 * seconds), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            other, off = _chains(scene, names, row.tol)
+            error = _apart(scene, found, other, names)
+            if off <= row.tol / LEAST:
+                return _judged(row, error, off, "chains")
+            finer = solve(scene, row.tol / 30, frames=FRAMES, progress=False)
+            own = max((finer.error_estimate or {})[name] for name in names)
+            unlike = _apart(scene, finer, other, names) / off
+            row = row._replace(unlike=unlike)
+            return _judged(row, _apart(scene, found, finer, names), own, "finer")
+    except (TimeUp, ValueError, SimulationError, ArithmeticError) as error:
+        return row._replace(outcome="no reference", says=shorten(f"{row.says} reference: {type(error).__name__} {error}", 200))
+
+
+def discs_row(drawn: Drawn, row: Row, seconds: float) -> Row:
+    """The discs of a scene by `simulate(..., "auto")`."""
+    try:
+        problem = lump(drawn.scene, drawn.n, "springs" if drawn.scene.steered or drawn.n % 2 else "consistent")
+    except ValueError as error:
+        return row._replace(outcome="refused", says=str(error), shown="no such chain")
+    names, row = problem.system.rows, row._replace(words=f"{row.words}, N = {drawn.n}, {problem.chain.ends}")
+    found, row = _tried(lambda: simulate(problem, "auto", tol=row.tol, frames=FRAMES, progress=False), row, seconds)
+    if found is None:
+        return row._replace(shown=_chains_end(drawn, seconds)) if row.outcome == "refused" else row
+
+    def relative(errors: Iterable[float]) -> float:
+        return max(e / (np.abs(getattr(found, name)).max() or 1.0) for e, name in zip(errors, names, strict=True))
+
+    def apart(a: Solution, b: Solution) -> float:
+        return relative(float(np.abs(getattr(a, name) - getattr(b, name)).max()) for name in names)
+
+    row = row._replace(estimate=relative((found.error_estimate or {})[name] for name in names))
+    h = problem.duration / max(round(problem.duration / found.stats["dt"]), 25)
+    try:
+        with at_most(4 * seconds), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            near, far = (simulate(problem, Gauss8(tolerance=1e-14, sweeps=20), h / m, FRAMES, progress=False) for m in (8, 4))
+        return _judged(row, apart(found, near), apart(near, far), "gauss8")
+    except (TimeUp, ValueError, SimulationError, ArithmeticError) as error:
+        return row._replace(outcome="no reference", says=shorten(f"reference: {type(error).__name__} {error}", 200))
+
+
+def _tried(compute: Any, row: Row, seconds: float) -> tuple[Solution | None, Row]:
+    """What is computed within the time, and the row with the seconds and what was said."""
+    begun = clock.process_time()
+    found, outcome, says = None, "", ""
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        try:
+            with at_most(seconds):
+                found = compute()
+        except TimeUp:
+            outcome = "cut off"
+        except (ValueError, SimulationError, ArithmeticError) as error:
+            outcome, says = "refused", f"{type(error).__name__}: {error}"
+    told = " ".join([says, *dict.fromkeys(str(w.message) for w in heard)])
+    return found, row._replace(outcome=outcome, says=re.sub(r"\s+", " ", told).strip(), seconds=clock.process_time() - begun)
+
+
+def _judged(row: Row, error: float, off: float, reference: str) -> Row:
+    """The row with its error, known up to what the reference errs."""
+    row = row._replace(error=error, reference=reference, reference_error=off)
+    if off > row.tol / LEAST:
+        return row._replace(outcome="no reference")
+    ratio = row.estimate / error if error > KNOWN * off else np.nan
+    return row._replace(outcome="within" if error <= row.tol + off else "ABOVE", ratio=ratio)
+
+
+def _chains(scene: Scene, names: Iterable[str], tol: float) -> tuple[Solution, float]:
+    """Chains extrapolated, and their error. Steps to a hundredth of the tolerance, or to what chains can err."""
+    runs = []
+    for size in SIZES:
+        problem = lump(scene, size if scene.closed else size + 1, "springs" if scene.steered else "consistent")
+        runs.append(simulate(problem, "auto", tol=float(np.clip(tol / 100, 1e-9, 1e-6)), frames=FRAMES, progress=False))
+    a, b, c = ({name: getattr(run, name)[:, ::every] for name in names} for run, every in zip(runs, (1, 2, 4), strict=True))
+    once = {name: b[name] + (b[name] - a[name]) / 3 for name in names}
+    twice = {name: c[name] + (c[name] - b[name]) / 3 for name in names}
+    off = max(
+        float(np.abs(twice[name] - once[name]).max()) / 3 + max((r.error_estimate or {})[name] for r in runs) for name in names
+    )
+    places = {name: twice[name] for name in names} | {"s": runs[0].s, "omega": 0 * twice["theta"]}
+    return Solution(t=runs[0].t, energy=runs[0].energy, **places), off
+
+
+def _apart(scene: Scene, a: Solution, b: Solution, names: Iterable[str]) -> float:
+    """The largest difference of two fields at the places of the one with fewer."""
+    a, b = sorted((a, b), key=lambda run: run.s.size)
+    return max(float(np.abs(getattr(a, name) - _at(scene, b, name, a.s)).max()) for name in names)
+
+
+def _at(scene: Scene, field: Solution, name: str, s: NDArray) -> NDArray:
+    """A field at places s, by its own nodes or a spline of degree 5 through them."""
+    near = np.clip(np.searchsorted(field.s, s), 0, field.s.size - 1)
+    near -= (near > 0) & (np.abs(field.s[near - 1] - s) < np.abs(field.s[near] - s))
+    values = getattr(field, name)
+    if np.allclose(field.s[near], s, rtol=0, atol=1e-9 * scene.rod.length):
+        return values[:, near]
+    if scene.closed:
+        more = {"x": scene.shift[0], "y": scene.shift[1], "phi": 2 * np.pi * scene.turns}.get(name, 0.0)
+        values = np.concatenate([values, values[:, :1] + more], axis=1)
+        return make_interp_spline(np.append(field.s, scene.rod.length), values, 5, axis=1)(s)
+    return make_interp_spline(field.s, values, 5, axis=1)(s)
+
+
+def _chains_end(drawn: Drawn, seconds: float) -> str:
+    """What chains of "gauss8" with short steps do where a field or a run was refused: whether, and when, they end too."""
+    said = []
+    for n in (65, 129):
+        try:
+            with at_most(seconds / 2), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                problem = lump(drawn.scene, n, "springs" if drawn.scene.steered else "consistent")
+                dt = min(problem.chain.k / 4, problem.duration / 400)
+                run = simulate(problem, Gauss8(tolerance=1e-12, sweeps=20), dt, 2, progress=False)
+            said.append(f"N = {n} goes on to the end, {run.stats['unconverged']} steps unconverged")
+        except TimeUp:
+            said.append(f"N = {n} took too long")
+        except (ValueError, SimulationError, ArithmeticError) as error:
+            said.append(f"N = {n}: {error}")
+    return "; ".join(said)
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What was found. rows : two for each scene. failed : cases that broke, as a sweep tells them."""
+
+    rows: list[Row]
+    failed: list[Result]
+
+    def of(self, by: str) -> list[Row]:
+        """The rows of "solve" or "simulate"."""
+        return [row for row in self.rows if row.by == by]
+
+    def table(self) -> str:
+        """All rows, in Markdown, refusals with their words."""
+        head = (
+            "scene",
+            "kind",
+            "law",
+            "initial fields",
+            "t",
+            "by",
+            "tol",
+            "outcome",
+            "error",
+            "estimate",
+            "ratio",
+            "s",
+            "reference",
+        )
+        lines = ["| " + " | ".join(head) + " | says |", "| --- " * (len(head) + 1) + "|"]
+        for r in self.rows:
+            numbers = [_shown(v) for v in (r.error, r.estimate)]
+            ratio = f"{r.ratio:.2g}" if np.isfinite(r.ratio) else "–"
+            reference = f"{r.reference} {r.reference_error:.0e}" if r.reference else "–"
+            says = shorten("; ".join(filter(None, [r.says, r.shown])), 300).replace("|", "\\|")
+            cells = (r.scene, r.kind, r.law, r.words.replace("|", "\\|"), f"{r.duration:.3g}", r.by, f"{r.tol:.1e}", r.outcome)
+            lines.append("| " + " | ".join([*cells, *numbers, ratio, f"{r.seconds:.2g}", reference, says]) + " |")
+        return "\n".join(lines)
+
+    def summary(self) -> str:
+        """Counts, the quantiles of estimate over error, and what is above its tolerance, as a table in Markdown."""
+        head = ("", *OUTCOMES, "estimate/error: least", "median", "90 %", "largest", "tol/error: median", "s: median", "largest")
+        lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
+        for by in ("solve", "simulate"):
+            rows = self.of(by)
+            counts = [str(sum(r.outcome == outcome for r in rows)) for outcome in OUTCOMES]
+            ratios = np.array([r.ratio for r in rows if np.isfinite(r.ratio)] or [np.nan])
+            spare = np.array([r.tol / r.error for r in rows if r.error > 0] or [np.nan])
+            seconds = np.array([r.seconds for r in rows] or [np.nan])
+            quantiles = [f"{np.quantile(ratios, p):.2g}" for p in (0.0, 0.5, 0.9, 1.0)]
+            cells = [by, *counts, *quantiles, f"{np.median(spare):.2g}", f"{np.median(seconds):.2g}", f"{seconds.max():.2g}"]
+            lines.append("| " + " | ".join(cells) + " |")
+        kinds = {r.reference for r in self.rows if r.reference}
+        lines.append("\nReferences: " + ", ".join(f"{k} {sum(r.reference == k for r in self.rows)}" for k in sorted(kinds)) + ".")
+        for r in self.rows:
+            if r.outcome == "ABOVE":
+                lines.append(f"* above: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}, error {r.error:.1e}")
+            if r.ratio > MOST:
+                lines.append(f"* cautious: {r.scene} ({r.kind}, {r.law}, {r.by}), estimate over error {r.ratio:.0f}")
+            if r.unlike > LEAST:
+                lines.append(f"* unlike the chains: {r.scene} ({r.kind}, {r.law}), by {r.unlike:.0f} times what they err")
+            if r.outcome == "refused":
+                lines.append(f"* refused: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}: {r.says} [{r.shown}]")
+        lines += [f"* broken: {r.case}: {r.error}" for r in self.failed]
+        return "\n".join(lines)
+
+    def save(self, path: str | Path) -> None:
+        """All rows, as CSV."""
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(Row._fields)
+            writer.writerows(self.rows)
+
+
+def _shown(value: float) -> str:
+    return f"{value:.1e}" if np.isfinite(value) else "–"
+
+
+def trust(
+    scenes: int = 200,
+    seed: int = 0,
+    first: int = 0,
+    seconds: float = 60.0,
+    executor: Executor | None = None,
+    archive: str | Path | None = None,
+    progress: bool = True,
+) -> Trust:
+    """Solve and run random scenes to random tolerances, 1e-2 to 1e-7, and measure their errors.
+
+    Parameters
+    ----------
+    scenes : how many, from number `first` on; their kinds take turns (`random_scenes.KINDS`).
+    seed : of the scenes and tolerances.
+    seconds : processor time that one `solve` or `simulate` may take, s; its reference two to four times that.
+    executor, archive, progress : as for `compare.sweep`.
+
+    Raises
+    ------
+    ValueError : for numbers outside their range.
+    """
+    start = checks.whole("first", first, 0)
+    last = start + checks.whole("scenes", scenes, 1)
+    limit = checks.number("seconds", seconds, positive=True)
+    cases = [[checks.whole("seed", seed, 0), index, limit] for index in range(start, last)]
+    return gathered(sweep(examine, cases, executor, archive, progress))
+
+
+def gathered(results: Iterable[Result]) -> Trust:
+    """The rows of what a sweep has found so far."""
+    found = sorted(results, key=lambda result: result.case)
+    return Trust([Row(*row) for r in found if not r.error for row in r.value], [r for r in found if r.error])
