@@ -1,5 +1,6 @@
 """Random scenes: what they are, a small sample of them, and that errors, refusals and slow runs are seen."""
 
+import signal
 import time as clock
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from compare.__main__ import main
 from compare.random_scenes import KINDS, PARAMETERS, random_scene
 from compare.trust import LEAST, MOST, Row, Trust, at_most, examine, trust
 
-SAMPLE = (7, 10, 11, 14, 17, 35)  # own headings, both laws, free and closed; chosen for their time only
+SAMPLE = (5, 7, 10, 14)  # own headings, both laws, free and closed; chosen for their time only
 
 
 def rows_of(index, seconds=20.0):
@@ -26,7 +27,8 @@ def test_scenes_obey_their_ends(index):
     assert drawn.kind == KINDS[index % len(KINDS)]
     assert 0.5 <= scene.duration <= 60
     values = [getattr(rod, name) for name in PARAMETERS]
-    assert len({*values, *PARAMETERS.values()}) == 10  # all different, and none of the paper's
+    assert len(set(values)) == 5
+    assert not set(values) & set(PARAMETERS.values())  # none is the paper's
     d = 1e-3 * rod.length
     if scene.closed:
         first, last = (scene.fields(place + d * np.arange(3)) for place in (0.0, rod.length))
@@ -34,6 +36,7 @@ def test_scenes_obey_their_ends(index):
         for name, value in last.items():
             assert value - shift.get(name, 0.0) == pytest.approx(first[name], abs=1e-9)
         return
+    bent = []
     for side in (d * np.arange(8), rod.length - d * np.arange(8)):
         fields = scene.fields(side)
         r = np.polynomial.Polynomial.fit(side, fields["x"] + 1j * fields["y"], 7)
@@ -41,9 +44,10 @@ def test_scenes_obey_their_ends(index):
         twist, rate = (np.polynomial.Polynomial.fit(side, fields[name], 7).deriv()(side[0]) for name in ("theta", "omega"))
         curvature = abs((slope.conjugate() * bend).imag) / abs(slope) ** 3
         assert abs(slope) == pytest.approx(1.0, abs=1e-6)
-        assert (curvature < 1e-4) == (drawn.kind != "bent end")
+        bent.append(curvature * rod.length)
         assert abs(twist) < 1e-6
         assert abs(rate) < 1e-6
+    assert (max(bent) < 1e-4) == (drawn.kind != "bent end")
 
 
 def test_scenes_depend_on_seed_and_index_only():
@@ -122,7 +126,7 @@ def test_refusals_and_slow_runs_are_told(monkeypatch):
     assert clock.process_time() - begun < 10
     with at_most(50.0):
         pass
-    assert sum(clock.process_time() < 0 for _ in range(10)) == 0  # no alarm is left
+    assert signal.getitimer(signal.ITIMER_PROF) == (0.0, 0.0)  # no alarm is left
 
 
 def test_command_line(tmp_path, capsys):
