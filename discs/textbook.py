@@ -12,7 +12,8 @@ Oscillators that drive one another are in `discs.oscillators`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,8 @@ from scipy.integrate import quad
 
 from discs import checks
 from discs.mechanics import MechanicalSystem, Trajectory
+
+FRAMES = ("t", "q", "v", "multipliers", "energy", "residual")  # of a Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +43,43 @@ class Textbook:
     exact: Callable[[float], tuple[NDArray, NDArray, NDArray]] | None = None
     invariants: dict[str, Callable[[NDArray, NDArray], float]] = field(default_factory=dict)
 
-    def integrate(self, times: ArrayLike, rtol: float = 1e-11) -> Trajectory:
-        """The motion from the start at times[0] = 0; see `MechanicalSystem.integrate`."""
-        return self.system.integrate(self.q, self.v, times, rtol)
+    def integrate(self, times: ArrayLike, rtol: float = 1e-11, **options: Any) -> Trajectory:
+        """The motion of the start at t = 0, at times (F,), increasing, which may lie before and after it.
+
+        `options` as of `MechanicalSystem.integrate`.
+        """
+        t = np.atleast_1d(checks.array("times", times))
+        if t.ndim != 1 or not t.size or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
+            raise ValueError("times must be at least one, increasing; the start is that of t = 0")
+        before, after = t[t < 0][::-1], t[t >= 0]
+        if not before.size and after.size > 1 and after[0] == 0:
+            return self.system.integrate(self.q, self.v, after, rtol, **options)
+        parts = []
+        if before.size:
+            path = self.system.integrate(self.q, self.v, [0.0, *before], rtol, **options)
+            parts.append(_frames(path, slice(None, 0, -1)))
+        if after.size:
+            first = () if after[0] == 0 else (0.0,)
+            # the start alone is the first frame of any motion
+            path = self.system.integrate(self.q, self.v, [*first, *after] if after[-1] > 0 else [0.0, _moment(t)], rtol, **options)
+            parts.append(_frames(path, slice(len(first), len(first) + after.size)))
+        return _joined(parts)
+
+
+def _moment(t: NDArray) -> float:
+    """A short time, for a motion of which only the start is asked for."""
+    return 1e-6 * float(np.abs(t).max()) or 1e-6
+
+
+def _frames(path: Trajectory, part: slice) -> Trajectory:
+    return replace(path, **{name: getattr(path, name)[part] for name in FRAMES})
+
+
+def _joined(parts: list[Trajectory]) -> Trajectory:
+    last = parts[-1]
+    stats = last.stats | {n: sum(p.stats[n] for p in parts) for n in ("steps", "evaluations")}
+    stats["rank_drops"] = sorted(moment for p in parts for moment in p.stats["rank_drops"])
+    return replace(last, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in FRAMES}, stats=stats)
 
 
 def _nonzero(name: str, value: float, why: str) -> float:
@@ -196,7 +233,7 @@ def chaplygin_sleigh(
     )
     j = inertia + mass * a**2
     top = np.sqrt(speed**2 + j * turn**2 / mass)
-    kappa, first = a * mass * top / j, np.arctanh(speed / top)
+    kappa, first = a * mass * top / j, np.arcsinh(speed / (np.sqrt(j / mass) * abs(turn)))
 
     def gd(tau: float) -> float:
         return float(2 * np.arctan(np.tanh(tau / 2)))
@@ -206,13 +243,18 @@ def chaplygin_sleigh(
         rate = np.sign(turn) * top * np.sqrt(mass / j) / np.cosh(tau)
         return heading + np.sign(turn) * np.sqrt(j / mass) / a * (gd(tau) - gd(first)), top * np.tanh(tau), rate
 
-    def speed_in(direction: Callable[[float], float]) -> Callable[[float], float]:
-        return lambda t: state(t)[1] * direction(state(t)[0])
-
     def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
-        x, y = (quad(speed_in(f), 0, t, epsabs=1e-13, epsrel=1e-13, limit=200)[0] for f in (np.cos, np.sin))
+        def way(direction: Callable[[float], float]) -> float:
+            """Integral of tanh tau times the direction from the start; the tolerance is that of a number near 1."""
+
+            def along(tau: float) -> float:
+                return float(np.tanh(tau) * direction(state((tau - first) / kappa)[0]))
+
+            return float(top / kappa * quad(along, first, first + kappa * t, epsabs=1e-13, epsrel=1e-13, limit=200)[0])
+
         phi, u, rate = state(t)
-        return np.array([x, y, phi]), np.array([u * np.cos(phi), u * np.sin(phi), rate]), np.array([mass * u * rate * inertia / j])
+        q, v = np.array([way(np.cos), way(np.sin), phi]), np.array([u * np.cos(phi), u * np.sin(phi), rate])
+        return q, v, np.array([mass * u * rate * inertia / j])
 
     q, v, _ = exact(0.0)
     return Textbook(system, q, v, exact)

@@ -21,6 +21,7 @@ The reduced form has no multipliers. With the columns of B spanning the kernel o
 The skew-gradient form of `discs.system` takes the B with B^T M B = 1. The three are one system of equations.
 """
 
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -29,9 +30,11 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike, NDArray
 
-from discs import checks, saddle
-
-STEP = 1e-30  # of derivatives along the imaginary axis, which have no rounding: f(q + i h v) = f(q) + i h df/dq.v + O(h^2)
+from discs import checks
+from discs.mechanics import motion, saddle
+from discs.mechanics.derivatives import Formula, ShapeError
+from discs.mechanics.motion import Trajectory
+from discs.mechanics.sizes import dense
 
 
 class Response(NamedTuple):
@@ -39,22 +42,6 @@ class Response(NamedTuple):
 
     acceleration: NDArray
     multipliers: NDArray
-
-
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,).
-
-    mu : (F, c), the charges of a vakonomic motion, see `discs.vakonomic`; None if it is nonholonomic.
-    """
-
-    t: NDArray
-    q: NDArray
-    v: NDArray
-    multipliers: NDArray
-    energy: NDArray
-    residual: NDArray
-    mu: NDArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +61,7 @@ class MechanicalSystem:
     constraint_rate : q, v -> A. = dA/dq.v, (c, m).
     drive : b, (c,).
     symmetry : q -> X, (m, g): velocities of g one-parameter groups that leave L as it is, affine in q; None if none are known.
+    formulas : M(q), V(q), A(q) of `from_lagrangian`; each says how its derivatives are taken and their error.
     """
 
     names: tuple[str, ...]
@@ -85,6 +73,12 @@ class MechanicalSystem:
     constraint_rate: Callable[[NDArray, NDArray], Any]
     drive: NDArray
     symmetry: Callable[[NDArray], NDArray] | None = None
+    formulas: tuple[Formula, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "names", _names("names", self.names))
+        object.__setattr__(self, "owners", _names("owners", self.owners))
+        object.__setattr__(self, "drive", checks.field("drive", self.drive, len(self.owners)))
 
     @classmethod
     def from_lagrangian(
@@ -97,45 +91,61 @@ class MechanicalSystem:
         drive: ArrayLike = 0.0,
         symmetry: Callable[[NDArray], ArrayLike] | None = None,
     ) -> "MechanicalSystem":
-        """A system from M (or M(q)), V(q) and A(q), formulas in NumPy that also take complex numbers (no abs, no hypot).
+        """A system from M (or M(q)), V(q) and A(q), formulas that take q (m,) and return numbers.
 
-        Derivatives are taken along the imaginary axis, exact to rounding.
+        Derivatives are exact to rounding where a formula also takes complex numbers, which is verified; elsewhere (`abs`,
+        `np.linalg.norm`, `math.sin`, an array of zeros that is filled in) they are real differences with an error of about 1e-12:
+        see `discs.mechanics.derivatives`. Formulas in `jax.numpy` are computed in double precision.
+
+        Parameters
+        ----------
+        names : m names of coordinates.
+        mass : M (m, m), symmetric, or q -> M.
+        potential : q -> V.
+        constraint : q -> A (c, m); c may be 0, with no owners.
+        owners : c names, whose constraint each row is.
+        drive, symmetry : as the attributes.
+
+        Raises
+        ------
+        ValueError : for arrays of a wrong shape, a formula that does not take q alone, or an M that is not symmetric.
         """
-
-        def m(q: NDArray) -> NDArray:
-            return np.asarray(mass(q) if callable(mass) else mass)
-
-        def along(f: Callable[[NDArray], Any], q: NDArray, v: NDArray) -> NDArray:
-            return np.imag(f(q + 1j * STEP * v)) / STEP
+        names, owners = _names("names", names), _names("owners", owners)
+        m, c = len(names), len(owners)
+        rows, height = Formula("A", _of_q("A", constraint), (c, m), m), Formula("V", _of_q("V", potential), (), m)
+        inertia = Formula("M", _of_q("M", mass) if callable(mass) else lambda q: mass, (m, m), m)
+        given = tuple(_shape_of(formula) for formula in (rows, inertia))
+        if given != ((c, m), (m, m)):
+            raise ValueError(
+                f"A must be of shape {(c, m)} and M of shape {(m, m)}, for {m} names and {c} owners; got {given[0]} and {given[1]}"
+            )
+        constant = None if callable(mass) else inertia(np.zeros(m))
+        if constant is not None:
+            saddle.symmetric(constant, names)
 
         def force(q: NDArray, v: NDArray) -> NDArray:
-            gradient = [along(lambda z: 0.5 * v @ m(z) @ v - potential(z), q, unit) for unit in np.eye(len(q))]
-            return np.array(gradient) - along(m, q, v) @ v
+            f = -height.slopes(q)
+            if constant is None:
+                slopes = inertia.slopes(q)  # dM_ij/dq_k
+                f = f + 0.5 * np.einsum("i,ijk,j->k", v, slopes, v) - (slopes @ v) @ v
+            return f
 
-        def a(q: NDArray) -> NDArray:
-            return np.atleast_2d(np.asarray(constraint(q)))
-
-        shape = (len(tuple(owners)), len(tuple(names)))
-        given = a(np.zeros(shape[1])).shape, m(np.zeros(shape[1])).shape
-        if given != (shape, (shape[1], shape[1])):
-            raise ValueError(
-                f"A must be of shape {shape} and M of shape {shape[1:] * 2}, for {shape[1]} names and {shape[0]} owners; "
-                f"got {given[0]} and {given[1]}"
-            )
         return cls(
-            tuple(names),
-            tuple(owners),
-            m,
-            lambda q: float(potential(q)),
+            names,
+            owners,
+            inertia if constant is None else lambda q: constant,
+            lambda q: float(height(q)),
             force,
-            a,
-            lambda q, v: along(a, q, v),
-            checks.field("drive", drive, len(owners)),
+            rows,
+            rows.along,
+            np.asarray(drive),
             None if symmetry is None else lambda q: np.asarray(symmetry(q), dtype=float),
+            (height, rows) if constant is not None else (height, rows, inertia),
         )
 
     def also(self, rows: ArrayLike, owners: Sequence[str], drive: ArrayLike = 0.0) -> "MechanicalSystem":
         """The system with more constraints, constant rows (k, m) with rows @ v = drive: a disc that is held, a motor."""
+        owners = _names("owners", owners)
         extra = scipy.sparse.csr_array(np.atleast_2d(np.asarray(rows, dtype=float)))
         if extra.shape != (len(owners), len(self.names)):
             raise ValueError(f"rows must have shape ({len(owners)}, {len(self.names)}), one row per owner; got {extra.shape}")
@@ -164,7 +174,7 @@ class MechanicalSystem:
         """G of the vakonomic equations, (m, c): (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) v_k; see `discs.vakonomic`."""
         q, v = self._vectors(q, v)
         slopes = (self.constraint_rate(q, unit) for unit in np.eye(len(q)))
-        d = np.stack([a.toarray() if hasattr(a, "toarray") else a for a in slopes], axis=-1)  # dA_ak/dq_j
+        d = np.stack([dense(a) for a in slopes], axis=-1)  # dA_ak/dq_j
         return (v @ d - d @ v).T
 
     def accelerations(self, q: ArrayLike, v: ArrayLike, mu: ArrayLike | None = None) -> Response:
@@ -196,13 +206,18 @@ class MechanicalSystem:
     def reduced(self, q: ArrayLike, v: ArrayLike) -> Response:
         """The same accelerations and multipliers from the reduced form, dense: for small systems and for teaching."""
         q, v = self._vectors(q, v)
-        m, a, f = self.mass(q), scipy.sparse.csc_array(self.constraint(q)), self.force(q, v)
-        square = scipy.sparse.csc_array(a @ a.T)
-        w = a.T @ scipy.sparse.linalg.spsolve(square, -(self.constraint_rate(q, v) @ v))
-        b = scipy.linalg.null_space(a.toarray())
-        u = np.linalg.solve(b.T @ (m @ b), b.T @ (f - m @ w))
-        acceleration = w + b @ u
-        return Response(acceleration, np.atleast_1d(scipy.sparse.linalg.spsolve(square, a @ (m @ acceleration - f))))
+        m, a, f = dense(self.mass(q)), dense(self.constraint(q)), self.force(q, v)
+        right = -(self.constraint_rate(q, v) @ v)
+        saddle.check(m, a, f, right, self.names, self.owners)
+        if saddle.rank(a) < len(a):
+            saddle.explain(m, a, right, self.names, self.owners)
+        d, r = np.split(saddle.scales(m, a), [len(f)])  # coordinates near mass 1, rows near norm 1
+        m, a, f, right = m * d * d[:, None], a * d * r[:, None], f * d, right * r
+        square = a @ a.T
+        w = a.T @ np.linalg.solve(square, right)
+        b = scipy.linalg.null_space(a) if len(a) else np.eye(len(f))
+        acceleration = w + b @ np.linalg.solve(b.T @ m @ b, b.T @ (f - m @ w))
+        return Response(d * acceleration, r * np.linalg.solve(square, a @ (m @ acceleration - f)))
 
     def residual(self, q: ArrayLike, v: ArrayLike) -> NDArray:
         """A v - b, (c,)."""
@@ -220,59 +235,84 @@ class MechanicalSystem:
         return 0.5 * float(v @ (self.mass(q) @ v)) + self.potential(q)
 
     def integrate(
-        self, q: ArrayLike, v: ArrayLike, times: ArrayLike, rtol: float = 1e-11, mu: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        times: ArrayLike,
+        rtol: float = 1e-11,
+        mu: ArrayLike | None = None,
+        *,
+        method: str = "auto",
+        atol: ArrayLike | None = None,
+        progress: bool = True,
     ) -> Trajectory:
-        """The motion from q, v at times[0], by SciPy's DOP853 on v. from the saddle point; for small systems.
+        """The motion from q, v at times[0], by SciPy's methods on v. from the saddle point; for small systems.
 
-        Nothing pulls the velocity back to the constraint: `residual` shows how well the equations alone keep it.
+        Explicit methods bring v, and q where a constraint is that of a position, back to the constraints after each step.
+        `residual` shows how well they are kept. Where constraints become dependent at one moment and the motion is smooth, it
+        goes on: see `discs.mechanics.rank_drops`.
 
         Parameters
         ----------
         q, v : (m,), coordinates and velocities at times[0].
-        times : (F,), increasing.
+        times : (F,), increasing, or all decreasing.
         rtol : tolerance of a step's error, relative to each coordinate.
         mu : (c,), charges at times[0] of the vakonomic motion, see `discs.vakonomic`; without them it is nonholonomic.
+        method : "DOP853", "RK45", "RK23" (explicit), "Radau", "BDF", "LSODA" (for stiff problems), or "auto": DOP853, and
+            Radau from where the problem is stiff. `Trajectory.stats` tells which.
+        atol : tolerance of a step's error, absolute: a number or one per entry of (q, v) or (q, v, mu). By default 1e-3 rtol of
+            what each quantity reaches.
+        progress : show a bar after a second.
 
         Raises
         ------
-        ValueError : if v does not obey the constraints, naming the worst owner, and for arrays of a wrong shape.
-        RuntimeError : if the motion cannot be continued.
+        ValueError : if v does not obey the constraints, naming the worst owner, V is not finite, M not symmetric or not positive,
+            and for arrays of a wrong shape.
+        RuntimeError : if the motion cannot be continued, with the time and why.
+
+        Warns
+        -----
+        UserWarning : if energy that is conserved (without drive), or a constraint, is off by over a hundredth; if rtol is out
+            of reach of the formulas' precision.
         """
         q, v = self._vectors(q, v)
-        checks.number("rtol", rtol, positive=True)
-        start = [q, v] if mu is None else [q, v, checks.vector("mu", mu, len(self.owners))]
-        t = np.atleast_1d(np.asarray(times, dtype=float))
-        if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
-            raise ValueError("times must be at least two, increasing, the first that of q and v")
-        off = np.abs(self.residual(q, v))
-        if off.max() > 1e-9 * max(np.abs(v).max(), np.abs(self.drive).max()):
-            worst = int(np.argmax(off))
-            raise ValueError(
-                f"v must obey the constraints; that of {self.owners[worst]} is off by {off[worst]:.3g}: "
-                "take consistent_velocity(q, v)"
-            )
-        m = len(q)
-
-        def rate(_: float, z: NDArray) -> NDArray:
-            q, v, mu = np.split(z, [m, 2 * m])
-            found = self.accelerations(q, v, mu if mu.size else None)
-            return np.concatenate([v, found.acceleration, -found.multipliers[: mu.size]])
-
-        found = scipy.integrate.solve_ivp(rate, (t[0], t[-1]), np.concatenate(start), "DOP853", t, rtol=rtol, atol=1e-3 * rtol)
-        if not found.success:
-            raise RuntimeError(f"the motion cannot be continued beyond t = {found.t[-1]:g}: {found.message}")
-        path, speed, charges = np.split(found.y.T, [m, 2 * m], axis=1)
-        frames = list(zip(path, speed, strict=True))
-        charged = frames if mu is None else zip(path, speed, charges, strict=True)
-        return Trajectory(
-            t,
-            path,
-            speed,
-            np.array([self.accelerations(*z).multipliers for z in charged]),
-            np.array([self.energy(*z) for z in frames]),
-            np.array([np.abs(self.residual(*z)).max() for z in frames]),
-            None if mu is None else charges,
-        )
+        charges = None if mu is None else checks.vector("mu", mu, len(self.owners))
+        return motion.integrate(self, q, v, charges, times, method, rtol, atol, progress)
 
     def _vectors(self, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, NDArray]:
         return tuple(checks.vector(name, given, len(self.names)) for name, given in (("q", q), ("v", v)))  # type: ignore[return-value]
+
+
+def _names(what: str, given: Sequence[str]) -> tuple[str, ...]:
+    """Names as a tuple; a string is one name."""
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def _of_q(name: str, formula: Callable[[NDArray], Any]) -> Callable[[NDArray], Any]:
+    """`formula`, which must take q alone."""
+    if not callable(formula):
+        raise ValueError(f"{name} must be a function of q; got {formula!r}")
+    try:
+        inspect.signature(formula).bind(None)
+    except TypeError as error:
+        raise ValueError(f"{name} must be a function of q alone, {name}(q); {error}") from None
+    except ValueError:  # a builtin without a signature
+        pass
+    return formula
+
+
+def _shape_of(formula: Formula) -> tuple[int, ...]:
+    """Shape of a formula's value at q = 0; the right one where it has none there."""
+    try:
+        formula(np.zeros(formula.size))
+    except ShapeError as error:
+        return error.given
+    except (
+        ArithmeticError,
+        IndexError,
+        RuntimeWarning,
+        ValueError,
+        np.linalg.LinAlgError,
+    ):  # not defined at 0: seen at the first q
+        pass
+    return formula.shape

@@ -1,0 +1,265 @@
+r"""Derivatives of a user's formulas M(q), V(q), A(q) that cannot be lost without a word.
+
+The complex step f(q + i h v) = f(q) + i h df/dq.v + O(h^2), h = 1e-30, has no rounding, but only where a formula is analytic and
+keeps complex numbers: `abs`, `np.linalg.norm`, an array of real numbers that is filled in, or a branch lose the imaginary part.
+Real differences lose nothing, but have an error. So both are taken:
+
+* At the first q each coordinate's derivative is taken by both. They must agree within the differences' own error.
+* Later each complex step is compared with one real difference (order 4, four evaluations) along a direction that moves all
+  coordinates. Where they disagree, all coordinates are compared again.
+* A formula whose complex step fails once is differentiated by real differences from then on: order 8, error estimated by those of
+  order 6, about 1e-12 of the largest entry. `Formula.error` is the last such estimate.
+
+The step h of a real difference belongs to a coordinate. It is found from below, in decades: rounding, eps |f|/h, falls, and
+as long as each derivative agrees with the best one so far within that one's error, h may grow. So a narrow feature of f is seen
+before a step is so long that it passes over it, and no unit of length is preferred.
+"""
+
+import importlib
+import sys
+import warnings
+from collections.abc import Callable
+from contextlib import nullcontext
+from typing import Any
+
+import numpy as np
+import scipy  # its parts, slow to import, when they are used
+from numpy.typing import NDArray
+
+STEP = 1e-30  # of the complex step
+EPS = float(np.finfo(float).eps)
+ENOUGH = 1e-12  # relative error at which no better step is sought
+TELLS = 1e-3  # a real difference whose error is larger says nothing: at q so large that rounding is as large as f's features
+MOST_SLACK = 1e-6
+ACCURATE = 1e-9  # a real difference whose error is larger, and larger than any before, gets a new step
+# weights of f(q + j h) - f(q - j h), j = 1 ... 4
+ORDER_8 = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
+ORDER_6 = np.array([3 / 4, -3 / 20, 1 / 60, 0])
+ORDER_4 = np.array([2 / 3, -1 / 12])
+ORDER_2 = np.array([1 / 2, 0])
+
+
+class Formula:
+    """A function q -> an array of a given shape, its values checked and its derivatives verified.
+
+    Parameters
+    ----------
+    name : what messages call it, "V".
+    call : the function of q (m,).
+    shape : of its values; () is a number.
+    size : m.
+
+    Attributes
+    ----------
+    how : "complex step" or "real differences", after the first derivative.
+    error : estimated error of its last derivatives, relative to their largest entry; 0 for the complex step.
+    """
+
+    def __init__(self, name: str, call: Callable[[NDArray], Any], shape: tuple[int, ...], size: int) -> None:
+        self.name, self.shape, self.size = name, shape, size
+        self.how, self.error = "complex step", 0.0
+        self._call = call
+        self._steps: NDArray | None = None  # (m,), of real differences
+        self._verified = False  # whether the complex step agreed with real differences once
+        self._slack = 0.0  # relative difference from real differences that rounding was found to explain
+        self._mix = np.cos(1.0 + 3.7 * np.arange(size)) / 4 + 0.75 * (-1.0) ** np.arange(size)  # 1/2 ... 1 in size, both signs
+
+    def __call__(self, q: NDArray) -> NDArray:
+        """The value at q, finite or not."""
+        with np.errstate(all="ignore"), _double():
+            given = self._call(np.array(q, dtype=float))
+        value = self._array(given, None)
+        kind = value.dtype.kind
+        if kind not in "fiuO" or (kind == "f" and value.dtype.itemsize < 8):
+            raise ValueError(f"{self.name}(q) must be real numbers in double precision; got {value.dtype}")
+        return self._array(value, float)
+
+    def along(self, q: NDArray, v: NDArray) -> NDArray:
+        """df/dq.v, of the formula's shape."""
+        steps = self._ready(q)
+        with np.errstate(all="ignore"):
+            reach = float(np.max(np.abs(v) / steps))
+        if reach == 0:
+            return np.zeros(self.shape)
+        return self._derivatives(q, v[:, None], np.array([1 / reach]), v)[..., 0]
+
+    def slopes(self, q: NDArray) -> NDArray:
+        """df/dq, (*shape, m)."""
+        steps = self._ready(q)
+        return self._derivatives(q, np.eye(self.size), self._mix * steps, None)
+
+    def _derivatives(self, q: NDArray, directions: NDArray, weights: NDArray, v: NDArray | None) -> NDArray:
+        """Derivatives along the columns of `directions` (m, k), the check being along directions @ weights."""
+        if self.how == "complex step":
+            found = self._complex(q, directions)
+            if found is not None and self._verified and (1e3 * EPS * np.abs(q) > self._steps).any():
+                return found  # q so large that rounding passes over features of f: a stage of a step that is not kept
+            off = np.inf if found is None else self._off(q, found @ weights, directions @ weights)
+            if found is not None and off <= self._slack:
+                return found
+            whole = self._examine(q)
+            if self.how == "complex step" and found is not None:
+                self._slack = min(2 * off, MOST_SLACK)  # the comparison was at fault: a formula with more rounding than most
+                return found
+            return whole if v is None else (whole @ v)[..., None]
+        assert self._steps is not None
+        # a single direction has its own step, the shortest that the coordinates ask for
+        scales = weights if v is not None else self._steps
+        taken = [self._difference(q, h * d, 1 / h) for h, d in zip(scales, directions.T, strict=True)]
+        found, error = np.stack([d for d, _ in taken], axis=-1), max(e for _, e in taken)
+        size = float(np.abs(found).max(initial=0.0))
+        if not error <= max(ACCURATE, 2 * self.error) * size:
+            whole = self._examine(q)
+            return whole if v is None else (whole @ v)[..., None]
+        self.error = error / size if size else 0.0
+        return found
+
+    # The complex step
+
+    def _complex(self, q: NDArray, directions: NDArray) -> NDArray | None:
+        """Derivatives along the columns by the complex step; None where the formula does not take complex numbers."""
+        found = []
+        try:
+            with np.errstate(all="ignore"), warnings.catch_warnings(), _double():
+                warnings.simplefilter("ignore")  # of imaginary parts that are discarded: the check tells
+                for d in directions.T:
+                    found.append(np.imag(self._array(self._call(q + 1j * STEP * d), complex)) / STEP)
+        except Exception:  # whatever a formula says to a complex number
+            return None
+        return np.stack(found, axis=-1)
+
+    def _off(self, q: NDArray, found: NDArray, d: NDArray) -> float:
+        """Relative difference of `found`, a derivative along d, and a real one of order 4, beyond that one's error."""
+        pairs = self._pairs(q, d, 2)
+        if pairs is None or not np.isfinite(found).all():
+            return np.inf
+        differences, size = pairs
+        fourth, second = (np.tensordot(w, differences, 1) for w in (ORDER_4, ORDER_2))
+        allowed = 1e-2 * np.abs(fourth - second).max(initial=0.0) + 100 * EPS * size
+        beyond = np.abs(found - fourth).max(initial=0.0) - allowed
+        return float(beyond / np.abs(fourth).max()) if beyond > 0 else 0.0
+
+    # Real differences
+
+    def _ready(self, q: NDArray) -> NDArray:
+        if self._steps is None:
+            if not np.isfinite(self(q)).all():
+                raise ValueError(f"{self.name} is not finite at q = {q}")
+            self._refuse_single(q)
+            self._examine(q)
+        assert self._steps is not None
+        return self._steps
+
+    def _refuse_single(self, q: NDArray) -> None:
+        """ValueError if all entries that change with q are numbers of single precision at several places."""
+        base, changed, single = self(q), np.zeros(self.shape, dtype=bool), np.ones(self.shape, dtype=bool)
+        for j in range(1, 4):
+            try:
+                value = self(q + 1e-3 * j * self._mix * np.maximum(np.abs(q), 1e-3))
+            except (ArithmeticError, ValueError):
+                return
+            changed |= value != base
+            with np.errstate(over="ignore"):
+                single &= value.astype(np.float32) == value
+        if changed.any() and single[changed].all():
+            raise ValueError(
+                f"{self.name}(q) is computed in single precision, with 7 digits, too few for its derivatives; use float64"
+            )
+
+    def _examine(self, q: NDArray) -> NDArray:
+        """df/dq by real differences with steps sought anew, and whether the complex step agrees with it."""
+        found, errors, steps = zip(*(self._search(q, k) for k in range(self.size)), strict=True)
+        self._steps, whole = np.array(steps), np.stack(found, axis=-1)
+        size = float(np.abs(whole).max(initial=0.0))
+        error = max(errors) / size if size else 0.0
+        if self.how == "complex step":
+            by_step = self._complex(q, np.eye(self.size))
+            if by_step is not None and np.isfinite(by_step).all():
+                agree = bool((np.abs(by_step - whole) <= 10 * np.array(errors) + 1e-3 * ENOUGH * size).all())
+                if (agree and error < TELLS) or (self._verified and error >= TELLS):
+                    self._verified = True
+                    return by_step
+            self.how = "real differences"
+        self.error = error
+        return whole
+
+    def _search(self, q: NDArray, k: int) -> tuple[NDArray, float, float]:
+        """Derivative along coordinate k, its error, and the step; see the head of the module."""
+        unit = np.eye(self.size)[k]
+        step = max(1e-12 * abs(q[k]), 1e-12)
+        longest = 1e-2 * max(abs(q[k]), 1.0)
+        best: tuple[NDArray, float, float] | None = None
+        while step <= longest:
+            new, error = self._difference(q, step * unit, 1 / step)
+            error += 4 * EPS * abs(q[k]) / step * float(np.abs(new).max(initial=0.0))  # the step itself is rounded
+            if best is not None and not np.abs(new - best[0]).max(initial=0.0) <= 2 * (best[1] + error):
+                break  # too long: passes over something that a shorter step saw
+            if not np.isfinite(error):
+                if best is not None:
+                    break
+            elif best is None or error <= best[1]:
+                best = new, error, step
+                if 0 < error <= ENOUGH * np.abs(new).max():
+                    break
+            step *= 10
+        if best is None:
+            raise ValueError(f"{self.name} is not finite about q = {q}: it has no derivative there")
+        return best
+
+    def _difference(self, q: NDArray, d: NDArray, scale: float) -> tuple[NDArray, float]:
+        """Derivative along d times `scale` by differences of order 8, and its error."""
+        pairs = self._pairs(q, d, 4)
+        if pairs is None:
+            return np.full(self.shape, np.nan), np.inf
+        differences, size = pairs
+        eighth, sixth = (np.tensordot(w, differences, 1) for w in (ORDER_8, ORDER_6))
+        return eighth * scale, float(4 * np.abs(eighth - sixth).max(initial=0.0) + 2 * EPS * size) * scale
+
+    def _pairs(self, q: NDArray, d: NDArray, count: int) -> tuple[NDArray, float] | None:
+        """f(q + j d) - f(q - j d), j = 1 ... count, and the largest |f|; None if one of them is not finite."""
+        found, size = [], 0.0
+        for j in range(1, count + 1):
+            try:
+                after, before = self(q + j * d), self(q - j * d)
+            except ShapeError:
+                raise
+            except (ArithmeticError, ValueError):  # a root of a negative number, an exponential too large
+                return None
+            size = max(size, float(np.abs(after).max(initial=0.0)), float(np.abs(before).max(initial=0.0)))
+            found.append(after - before)
+        return (np.array(found), size) if np.isfinite(size) else None
+
+    def _array(self, given: Any, dtype: type | None) -> NDArray:
+        """What a formula returned as an array of its own, of the right shape; one row may be given as a vector."""
+        if scipy.sparse.issparse(given):
+            given = given.toarray()
+        try:
+            value = np.array(given, dtype=dtype)
+        except (TypeError, ValueError):
+            if dtype is complex:
+                raise
+            raise ValueError(f"{self.name}(q) must be numbers of shape {self.shape}; got {given!r}") from None
+        wanted = int(np.prod(self.shape))
+        if value.shape != self.shape and value.size == wanted and (wanted <= 1 or value.ndim < 2):
+            return value.reshape(self.shape)
+        if value.shape != self.shape:
+            raise ShapeError(self.name, self.shape, value.shape)
+        return value
+
+
+class ShapeError(ValueError):
+    """A formula's value of a wrong shape."""
+
+    def __init__(self, name: str, wanted: tuple[int, ...], given: tuple[int, ...]) -> None:
+        super().__init__(f"{name}(q) must be of shape {wanted}; got {given}")
+        self.given = given
+
+
+def _double() -> Any:
+    """JAX in double precision, where it is in use; formulas in `jax.numpy` are in single precision otherwise."""
+    jax = sys.modules.get("jax")
+    if jax is None:
+        return nullcontext()
+    if hasattr(jax, "enable_x64"):
+        return jax.enable_x64(True)
+    return importlib.import_module("jax.experimental").enable_x64()  # before jax 0.8

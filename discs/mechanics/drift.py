@@ -1,0 +1,89 @@
+r"""Drift off the constraints, and how it is taken back.
+
+The equations keep A v = b only as a rate, so the errors of steps add up. After a step v is projected, orthogonally in M, on
+what the constraints allow. Rows whose one-form A_a dq is closed, d(A_a dq) = 0, are the gradients of functions c_a(q), as of a
+loop of bars or a pendulum's rod; then c_a must be c_a(0) + b_a t. Its drift is the line integral of A_a dq over the steps,
+whatever the path: Gauss's formula on the straight line from q_n to q_{n+1}. It is taken back by Newton's method along M^{-1}
+A^T.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.mechanics import saddle
+from discs.mechanics.sizes import Sizes, dense, residual_size
+
+if TYPE_CHECKING:
+    from discs.mechanics.system import MechanicalSystem
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+EPS = float(np.finfo(float).eps)
+CLOSED = 1e-6  # dA(u, w) relative to the two terms whose difference it is
+
+
+class Drift:
+    """Drift of a motion off its constraints.
+
+    rows : (c,), which rows of A are closed.
+    off : drift of the functions c_a behind the closed rows, (number of closed rows,).
+    """
+
+    def __init__(self, system: "MechanicalSystem", sizes: Sizes) -> None:
+        self.system, self.sizes, self.m = system, sizes, sizes.m
+        self.rows = self._closed()
+        self.off = np.zeros(int(self.rows.sum()))
+        self.drive = system.drive[self.rows]
+
+    def _closed(self) -> NDArray:
+        """Rows with dA_a(u, w) = (dA_a.u) w - (dA_a.w) u = 0 for random u, w, at the start and near it."""
+        rng, system = np.random.default_rng(1), self.system
+        closed = np.ones(len(system.owners), dtype=bool)
+        for near in (0.0, 1.0, 2.0):
+            q = self.sizes.start + near * self.sizes.shift * rng.standard_normal(self.m)
+            for u, w in self.sizes.unit * rng.standard_normal((2, 2, self.m)):
+                try:
+                    one, other = system.constraint_rate(q, u) @ w, system.constraint_rate(q, w) @ u
+                except (ArithmeticError, ValueError):  # q is no place for the formulas
+                    return np.zeros(len(system.owners), dtype=bool)
+                closed &= np.abs(one - other) <= CLOSED * (np.abs(one) + np.abs(other))
+        return closed
+
+    def add(self, before: NDArray, after: NDArray, time: float) -> None:
+        """Add what a step over `time` from q `before` to q `after` adds to the drift."""
+        if self.off.size:
+            self.off = self.off + self._change(before, after) - self.drive * time
+
+    def positions(self, q: NDArray) -> NDArray:
+        """q with the drift taken back; q itself where there is none."""
+        for _ in range(4):
+            if not self.off.size:
+                break
+            rows = dense(self.system.constraint(q))[self.rows]
+            if (np.abs(self.off) <= 4 * EPS * np.abs(rows) @ (np.abs(q) + self.sizes.shift)).all():
+                break
+            owners = [o for o, row in zip(self.system.owners, self.rows, strict=True) if row]
+            shift, _ = saddle.solve(dense(self.system.mass(q)), rows, np.zeros(self.m), -self.off, self.system.names, owners)
+            self.off, q = self.off + self._change(q, q + shift), q + shift
+        return q
+
+    def corrected(self, y: NDArray) -> NDArray:
+        """(q, v, mu) with q and v back on the constraints; y itself where they are, or where the rows of A are dependent."""
+        try:
+            q = self.positions(y[: self.m])
+            v = y[self.m : 2 * self.m]
+            if (np.abs(self.system.residual(q, v)) > 8 * EPS * residual_size(self.system, q, v)).any():
+                v = self.system.consistent_velocity(q, v)
+            elif q is y[: self.m]:
+                return y
+        except ValueError:
+            return y
+        return np.concatenate([q, v, y[2 * self.m :]])
+
+    def _change(self, before: NDArray, after: NDArray) -> NDArray:
+        """c_a(after) - c_a(before) by Gauss's formula."""
+        way = after - before
+        places = (before + (0.5 + 0.5 * node) * way for node in NODES)
+        rows = (dense(self.system.constraint(q))[self.rows] @ way for q in places)
+        return np.sum([0.5 * w * row for w, row in zip(WEIGHTS, rows, strict=True)], axis=0)

@@ -1,0 +1,262 @@
+r"""The motion of a mechanical system in time, by SciPy's methods on v. from the saddle point.
+
+The error of a step is bounded by rtol |y| + atol. Unless given, atol is 1e-3 rtol of each quantity's own size
+(`discs.mechanics.sizes`), so steps are the same in any units. After each step of an explicit method q and v are brought back to
+the constraints (`discs.mechanics.drift`). A moment at which constraints become dependent is passed where the motion is smooth
+(`discs.mechanics.rank_drops`). An implicit method takes over where the problem is stiff (`discs.mechanics.stiffness`).
+
+Where the equations have no finite answer, steps get shorter, and where no step is short enough an error names the time and the
+reason.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy  # its parts, slow to import, when they are used
+from numpy.typing import ArrayLike, NDArray
+
+from discs import checks
+from discs.mechanics.drift import Drift
+from discs.mechanics.rank_drops import RankDrops
+from discs.mechanics.sizes import Sizes, residual_size
+from discs.mechanics.stiffness import Stiffness
+from discs.warn import warn
+
+if TYPE_CHECKING:
+    from discs.mechanics.system import MechanicalSystem
+
+METHODS = ("auto", "DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
+EXPLICIT = ("DOP853", "RK45", "RK23")  # of one step: the state can be corrected after each
+LEAST_RTOL = 100 * float(np.finfo(float).eps)
+LOST = 0.01  # of the largest kinetic energy, or of a constraint: a motion is warned of
+STALLED, STALLED_NEAR = 1000, 50  # this many steps over less than 1e-6 of the time end a motion; so near to dependent rows
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,).
+
+    mu : (F, c), the charges of a vakonomic motion, see `discs.vakonomic`; None if it is nonholonomic.
+    stats : "method", "rtol" as used, "steps", "evaluations" (of accelerations), "rank_drops" (times at which constraints were
+        dependent), and "derivatives": of each formula how they were taken and their largest relative error at the frames.
+
+    Multipliers are nan at a moment when rows of A are dependent: they are not determined then.
+    """
+
+    t: NDArray
+    q: NDArray
+    v: NDArray
+    multipliers: NDArray
+    energy: NDArray
+    residual: NDArray
+    mu: NDArray | None = None
+    stats: dict[str, Any] = field(default_factory=dict)
+
+
+class Rate:
+    """d/dt of (q, v, mu). Where it has no finite value it is nan, so that steps get shorter, and `trouble` says why."""
+
+    def __init__(self, system: "MechanicalSystem") -> None:
+        self.system, self.m = system, len(system.names)
+        self.trouble, self.evaluations = "", 0
+
+    def __call__(self, t: float, y: NDArray) -> NDArray:
+        self.evaluations += 1
+        if not np.isfinite(y).all():
+            return np.full_like(y, np.nan)
+        q, v, mu = np.split(y, [self.m, 2 * self.m])
+        try:
+            found = self.system.accelerations(q, v, mu if mu.size else None)
+        except (ValueError, ArithmeticError) as error:  # of the formulas, or of a singular saddle point
+            self.trouble = str(error)
+            return np.full_like(y, np.nan)
+        return np.concatenate([v, found.acceleration, -found.multipliers[: mu.size]])
+
+
+def integrate(
+    system: "MechanicalSystem",
+    q: NDArray,
+    v: NDArray,
+    mu: NDArray | None,
+    times: ArrayLike,
+    method: str,
+    rtol: float,
+    atol: ArrayLike | None,
+    progress: bool,
+) -> Trajectory:
+    """`MechanicalSystem.integrate`, of checked q, v, mu."""
+    t = np.atleast_1d(checks.array("times", times))
+    if t.ndim != 1 or t.size < 2 or not np.isfinite(t).all() or not (np.all(np.diff(t) > 0) or np.all(np.diff(t) < 0)):
+        raise ValueError("times must be at least two, increasing (or all decreasing), the first that of q and v")
+    checks.choice("method", method, METHODS)
+    if checks.number("rtol", rtol, positive=True) < LEAST_RTOL:
+        raise ValueError(f"rtol must be at least {LEAST_RTOL:.3g}, as doubles are rounded; got {rtol!r}")
+    start = np.concatenate([q, v] if mu is None else [q, v, mu])
+    if atol is not None:
+        atol = checks.field("atol", atol, start.size, least=0.0)
+    if not np.isfinite(height := system.potential(q)):
+        raise ValueError(f"V must be finite at the start; V(q) = {height:g}")
+    off = np.abs(system.residual(q, v))
+    wrong = off > 1e-9 * residual_size(system, q, v)
+    if wrong.any():
+        worst = int(np.argmax(np.where(wrong, off, 0)))
+        raise ValueError(
+            f"v must obey the constraints; that of {system.owners[worst]} is off by {off[worst]:.3g}: "
+            "take consistent_velocity(q, v)"
+        )
+    system.accelerations(q, v, mu)  # what is wrong at the start is raised as it is; derivatives are examined
+    rtol = _within_reach(system, rtol)
+    found, stats = _follow(system, start, t, method, rtol, atol, progress)
+    path = _trajectory(system, t, found, mu is not None, stats)
+    _watch(system, path)
+    return path
+
+
+def _within_reach(system: "MechanicalSystem", rtol: float) -> float:
+    """A tolerance that the derivatives of formulas allow, with a warning where it is not the one asked for."""
+    error, name = max(((f.error, f.name) for f in system.formulas), default=(0.0, ""))
+    if error <= 10 * rtol:
+        return rtol
+    warn(
+        f"derivatives of {name}(q) are known to {error:.1g} only, as it has more rounding than doubles have, or is not smooth; "
+        f"rtol is raised from {rtol:g} to {error:.1g}"
+    )
+    return error
+
+
+def _follow(
+    system: "MechanicalSystem",
+    start: NDArray,
+    times: NDArray,
+    method: str,
+    rtol: float,
+    atol: NDArray | None,
+    progress: bool,
+) -> tuple[NDArray, dict[str, Any]]:
+    """(q, v, mu) at all times, and statistics."""
+    from tqdm import tqdm
+
+    rate, m, end = Rate(system), len(system.names), times[-1]
+    span, direction = abs(end - times[0]), float(np.sign(end - times[0]))
+    sizes = Sizes(system, start, rate(times[0], start), span)
+    drift, stiffness = Drift(system, sizes), Stiffness()
+    ranks = RankDrops(system, sizes, drift)
+    kind = "DOP853" if method == "auto" else method
+    found, done = np.empty((times.size, start.size)), 1
+    found[0], steps, moments = start, 0, []
+    recent: deque[float] = deque([times[0]], maxlen=STALLED)
+
+    def absolute(y: NDArray) -> NDArray:
+        return 1e-3 * rtol * sizes.of(y) if atol is None else atol
+
+    def solver_from(t: float, y: NDArray, step: float | None = None) -> Any:
+        first = None if step is None else min(step, abs(end - t))
+        made = getattr(scipy.integrate, kind)(rate, t, y, end, rtol=rtol, atol=absolute(y), first_step=first)
+        if hasattr(made, "h_abs") and not made.h_abs > 0:  # the rate was nan where SciPy looked for a first step
+            made.h_abs = 1e-6 * abs(end - t)
+        return made
+
+    def record(until: float, between: Any) -> None:
+        nonlocal done
+        while done < times.size and direction * (times[done] - until) <= 0:
+            found[done] = between(times[done])
+            done += 1
+
+    solver = solver_from(times[0], start)
+    form = "{l_bar}{bar}| t = {n:.4g} of {total:.4g} [{elapsed}<{remaining}]"
+    bar = tqdm(total=span, desc="motion", bar_format=form, delay=1, disable=not progress)
+    with bar, np.errstate(all="ignore"):  # a trial step may be wild
+        while done < times.size:
+            before, y_before, said = solver.t, solver.y, solver.step()
+            steps += 1
+            y, drifted, again = solver.y, drift.off, False
+            if solver.status != "failed":
+                drift.add(y_before[:m], y[:m], solver.t - before)
+                y = drift.corrected(y) if kind in EXPLICIT else y
+                large = np.abs(y - solver.y) > 100 * (rtol * np.abs(y) + absolute(y))
+                again = ranks.crossed(solver.y) or bool(large.any())
+            recent.append(before if again else solver.t)
+            count = STALLED if not ranks.words() else STALLED_NEAR
+            stalled = len(recent) >= count and abs(recent[-1] - recent[-count]) < 1e-6 * span
+            if solver.status == "failed" or stalled:
+                raise RuntimeError(
+                    f"the motion cannot be continued beyond t = {solver.t:.9g}: {_reason(solver, rate, ranks, said)}"
+                )
+            if again:  # the step was too long for the constraints
+                drift.off = drifted
+                solver = solver_from(before, y_before, abs(solver.t - before) / 3)
+                continue
+            if direction * (times[done] - solver.t) <= 0:
+                record(solver.t, solver.dense_output())
+            bar.update(abs(solver.t - before))
+            if done == times.size:
+                break
+            sizes.update(solver.y)
+            solver.atol = absolute(solver.y)
+            if y is not solver.y:
+                solver.y, solver.f = y, rate(solver.t, y)
+            if over := ranks.passage(rate, solver, direction, rtol):
+                moments.append(float(over.moment))
+                record(over.end, over.between)
+                if done == times.size:
+                    break
+                drift.add(solver.y[:m], over.y[:m], over.end - solver.t)
+                bar.update(abs(over.end - solver.t))
+                solver = solver_from(over.end, drift.corrected(over.y), abs(over.end - solver.t))
+            elif ranks.lost():
+                raise RuntimeError(f"the motion cannot be continued beyond t = {solver.t:.9g}: {ranks.words()}")
+            elif method == "auto" and kind == "DOP853" and stiffness.shown(solver):
+                step = stiffness.implicit_step(rate, solver, rtol, absolute(solver.y))
+                if step is not None:
+                    kind = "Radau"
+                    solver = solver_from(solver.t, solver.y, step)
+    return found, {"method": kind, "rtol": rtol, "steps": steps, "evaluations": rate.evaluations, "rank_drops": moments}
+
+
+def _reason(solver: Any, rate: Rate, ranks: RankDrops, said: str | None) -> str:
+    """Why a motion ends."""
+    if why := ranks.words() or rate.trouble:
+        return why
+    if said:
+        return f"{said} (V = {rate.system.potential(solver.y[: rate.m]):.3g} there)"
+    return f"steps have come down to {abs(solver.step_size):.1g}; take a larger rtol, or a method for stiff problems"
+
+
+def _trajectory(system: "MechanicalSystem", t: NDArray, found: NDArray, charged: bool, stats: dict[str, Any]) -> Trajectory:
+    m = len(system.names)
+    path, speed, charges = np.split(found, [m, 2 * m], axis=1)
+    multipliers = np.full((t.size, len(system.owners)), np.nan)
+    errors = dict.fromkeys((f.name for f in system.formulas), 0.0)
+    for frame, (q, v, mu) in enumerate(zip(path, speed, charges, strict=True)):
+        try:
+            multipliers[frame] = system.accelerations(q, v, mu if charged else None).multipliers
+        except ValueError:
+            if not stats["rank_drops"]:
+                raise
+        errors = {f.name: max(errors[f.name], f.error) for f in system.formulas}
+    stats["derivatives"] = {f.name: {"how": f.how, "error": errors[f.name]} for f in system.formulas}
+    energy = np.array([system.energy(*z) for z in zip(path, speed, strict=True)])
+    residual = np.array([np.abs(system.residual(*z)).max(initial=0.0) for z in zip(path, speed, strict=True)])
+    return Trajectory(t, path, speed, multipliers, energy, residual, charges if charged else None, stats)
+
+
+def _watch(system: "MechanicalSystem", path: Trajectory) -> None:
+    """Warn where energy is lost or gained, or a constraint left."""
+    method, cure = path.stats["method"], f"the motion may not be trusted; take a smaller rtol than {path.stats['rtol']:g}"
+    kinetic = np.array([0.5 * v @ (system.mass(q) @ v) for q, v in zip(path.q, path.v, strict=True)])
+    off = np.abs(path.energy - path.energy[0])
+    rounding = 1e-12 * np.abs(path.energy - kinetic).max()
+    f = int(np.argmax(off))
+    if not np.any(system.drive) and off[f] > LOST * kinetic.max() + rounding:
+        warn(
+            f"{method}: energy is conserved, but at t = {path.t[f]:g} it is {path.energy[f]:.3g} and not {path.energy[0]:.3g}: "
+            f"{cure}"
+        )
+    for t, q, v in zip(path.t, path.q, path.v, strict=True):
+        left = np.abs(system.residual(q, v)) > LOST * residual_size(system, q, v)
+        if left.any():
+            owner = system.owners[int(np.argmax(left))]
+            warn(f"{method}: at t = {t:g} the velocity is off the constraint of {owner} by over a hundredth: {cure}")
+            return

@@ -1,0 +1,76 @@
+r"""Sizes of a motion's quantities in their own units, for tolerances that do not depend on units.
+
+A velocity has the size sqrt(2 T/M_kk), T the largest kinetic energy so far; a coordinate the largest displacement so far; a
+charge mu_a of the vakonomic equations sqrt(2 T)/|A_a|, |A_a| the row's norm in coordinates of mass 1.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy  # its parts, slow to import, when they are used
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from discs.mechanics.system import MechanicalSystem
+
+TINY = float(np.finfo(float).tiny)
+
+
+def dense(a: Any) -> NDArray:
+    """An array of what may be sparse."""
+    return a.toarray() if scipy.sparse.issparse(a) else np.asarray(a)
+
+
+def units(system: "MechanicalSystem", q: NDArray) -> NDArray:
+    """1/sqrt(M_kk), (m,): the speed of each coordinate at kinetic energy 1/2.
+
+    Of a coordinate without inertia of its own: the largest that the constraints give it at that energy.
+    """
+    mass = system.mass(q)
+    diagonal = mass.diagonal()
+    if (diagonal > 0).all():
+        return 1 / np.sqrt(diagonal)
+    kernel = scipy.linalg.null_space(dense(system.constraint(q)))
+    reduced = np.linalg.inv(kernel.T @ (mass @ kernel))
+    speeds = np.sqrt(np.maximum(np.einsum("kb,bc,kc->k", kernel, reduced, kernel), 0))
+    return np.where(diagonal > 0, 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)), speeds)
+
+
+def residual_size(system: "MechanicalSystem", q: NDArray, v: NDArray) -> NDArray:
+    """What A v - b is compared with, (c,): the sum of |A_ik| times the size of v_k, and |b|."""
+    size = units(system, q) * _norm(system.mass(q), v)
+    return abs(system.constraint(q)) @ np.maximum(size, np.abs(v)) + np.abs(system.drive)
+
+
+class Sizes:
+    """Sizes of q, v and mu along a motion.
+
+    unit : (m,), see `units`; speed : sqrt(2 T), the largest so far; shift : (m,), the largest displacement so far.
+    """
+
+    def __init__(self, system: "MechanicalSystem", y: NDArray, rate: NDArray, span: float) -> None:
+        self.system, self.m, self.start = system, len(system.names), y[: len(system.names)]
+        self.unit = units(system, self.start)
+        mass = system.mass(self.start)
+        speed, pull = (_norm(mass, z[self.m : 2 * self.m]) for z in (y, rate))
+        time = min(1e-3 * span, speed / pull) if speed and pull else 1e-3 * span  # that the motion takes to change, or less
+        self.speed = max(speed, pull * time)
+        self.shift = np.maximum(self.unit * self.speed * time, TINY)
+
+    def update(self, y: NDArray) -> None:
+        q, v = y[: self.m], y[self.m : 2 * self.m]
+        self.speed = max(self.speed, _norm(self.system.mass(q), v))
+        self.shift = np.maximum(self.shift, np.abs(q - self.start))
+
+    def of(self, y: NDArray) -> NDArray:
+        """Sizes of the entries of y, (2m,) or (2m + c,)."""
+        parts = [self.shift, np.maximum(self.unit * self.speed, TINY)]
+        if len(y) > 2 * self.m:
+            rows = dense(self.system.constraint(y[: self.m])) * self.unit
+            parts.append(self.speed / np.maximum(np.linalg.norm(rows, axis=1), TINY))
+        return np.concatenate(parts)
+
+
+def _norm(mass: Any, v: NDArray) -> float:
+    """sqrt(v.Mv)."""
+    return float(np.sqrt(max(float(v @ (mass @ v)), 0.0)))
