@@ -1,8 +1,9 @@
 """The correspondence: a rod lumped into discs."""
 
-from continuum.mesh import semidiscretise
+from continuum.mesh import semidiscretise, unseen
 from continuum.rod import Scene
 from discs import Problem
+from discs.warn import warn
 
 
 def lump(scene: Scene, n: int, ends: str = "springs") -> Problem:
@@ -18,5 +19,13 @@ def lump(scene: Scene, n: int, ends: str = "springs") -> Problem:
     ends : "springs", the chain one would build: errors fall like 1/n; "consistent", with the end half-cells' bending
         and the inner headings' truncation error: like 1/n**2; "paper", "springs" with end discs of full weight. A closed
         scene makes a ring of discs.
+
+    Returns
+    -------
+    The problem. A warning says where the discs are too few to see the initial fields (`continuum.mesh.unseen`), or where the fields
+    jump or are noise, so that more discs come to no limit.
     """
-    return semidiscretise(scene, n, ends)
+    problem = semidiscretise(scene, n, ends)
+    if warning := unseen(scene, problem):
+        warn(warning)
+    return problem

@@ -45,6 +45,7 @@ class Resolved:
     scene : the scene.
     pieces : (P + 1,), edges of the pieces, from 0 to the length; corners are among them.
     energy : kinetic and potential energy by Gauss quadrature, relative error about 1e-12.
+    potential : the potential energy alone.
     features : (place, width) of all that is narrower than length/20: the middle of a stretch where some field f of size F has
         g = max(|f'|, sqrt(F |f''|/2))/F above 20/length, and 1/max g there, about w for exp(-(s/w)^2) and tanh(s/w).
     kinks : places where the slope of a field jumps, to 1e-10 of the length.
@@ -53,6 +54,7 @@ class Resolved:
     scene: Scene
     pieces: NDArray
     energy: float
+    potential: float
     features: tuple[tuple[float, float], ...] = ()
     kinks: tuple[float, ...] = ()
 
@@ -89,7 +91,8 @@ def _resolve(scene: Scene) -> Resolved:
         p = int(np.argmax(cut.lost))
         data.refuse(cut.worst[p], f"has no finite slope at s = {cut.edges[p]:g}", "take data with finite slopes there")
     with np.errstate(all="ignore"):
-        energies, fewer = _energies(data, cut), _energies(data, replace(cut, c=cut.c[..., : 3 * POINTS // 4]))
+        parts = _energies(data, cut)
+        energies, fewer = parts.sum(axis=0), _energies(data, replace(cut, c=cut.c[..., : 3 * POINTS // 4])).sum(axis=0)
     unsettled = np.abs(energies - fewer) + np.where(cut.width < SHARP * scene.rod.length, energies, 0.0)
     rounding = 1e-16 * (scene.rod.torsion_stiffness + scene.rod.bending_stiffness) / scene.rod.length
     if not unsettled.sum() <= 1e-3 * energies.sum() + rounding:  # nan too
@@ -99,7 +102,7 @@ def _resolve(scene: Scene) -> Resolved:
             f"millionth of the length there; take data that vary over length/500 = {scene.rod.length / 500:g} or more"
         )
     _check_jumps(data, cut)
-    return Resolved(scene, cut.edges, float(energies.sum()), _features(data, cut), _kinks(data, cut))
+    return Resolved(scene, cut.edges, float(energies.sum()), float(parts[1].sum()), _features(data, cut), _kinks(data, cut))
 
 
 def _seam(data: Data) -> NDArray:
@@ -200,26 +203,26 @@ def _kinks(data: Data, cut: Cut) -> tuple[float, ...]:
 
 
 def _energies(data: Data, cut: Cut) -> NDArray:
-    """Energy of every piece, (P,); `Rod` has the densities."""
+    """Kinetic and potential energy of every piece, (2, P); `Rod` has the densities."""
     scene, rod = data.scene, data.scene.rod
     value, slope, bend = (dict(zip(data.names, cut.at(NODES, d), strict=True)) for d in range(3))
     z = slope["x"] + data.chord[0] + 1j * (slope["y"] + data.chord[1])
     z1 = bend["x"] + 1j * bend["y"]
     if isinstance(rod, SteeredRod):
         strain = z * np.exp(-1j * value["phi"]) - 1
-        density = rod.inertia * value["omega"] ** 2 + rod.heading_inertia * value["phi_rate"] ** 2
-        density += rod.stretch_stiffness * strain.real**2 + rod.shear_stiffness * strain.imag**2
+        kinetic = rod.inertia * value["omega"] ** 2 + rod.heading_inertia * value["phi_rate"] ** 2
+        density = rod.stretch_stiffness * strain.real**2 + rod.shear_stiffness * strain.imag**2
         density += rod.bending_stiffness * slope["phi"] ** 2
     else:
         stretched = 1.0 if scene.rolling == "unit" else np.abs(z) ** 2
-        density = (rod.spin_inertia + rod.density * rod.radius**2 * stretched) * value["omega"] ** 2
+        kinetic = (rod.spin_inertia + rod.density * rod.radius**2 * stretched) * value["omega"] ** 2
         if rod.curvature == "linear":
-            density += rod.bending_stiffness * np.abs(z1) ** 2
+            density = rod.bending_stiffness * np.abs(z1) ** 2
         else:
             turning = (z.conj() * z1).imag / np.abs(z) ** 2 if rod.bending_stiffness else 0.0
-            density += rod.bending_stiffness * turning**2 + rod.stretch_stiffness * (np.abs(z) - 1) ** 2
+            density = rod.bending_stiffness * turning**2 + rod.stretch_stiffness * (np.abs(z) - 1) ** 2
     density += rod.torsion_stiffness * slope["theta"] ** 2
-    energies: NDArray = cut.width / 4 * (density @ WEIGHTS)
+    energies: NDArray = cut.width / 4 * (np.stack([kinetic, density]) @ WEIGHTS)
     return energies
 
 

@@ -1,5 +1,6 @@
 """Fields to a tolerance, or by the paper's scheme: `solve(scene, ...)`."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -10,17 +11,19 @@ from tqdm import tqdm
 
 from continuum.bounds import FIELDS, bounds, missed, over
 from continuum.initial import resolve
-from continuum.mesh import semidiscretise
+from continuum.mesh import semidiscretise, unseen
 from continuum.refinement import solve_elements
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
 from continuum.told import tells_scene
 from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.simulation import frame_times
+from discs.warn import warn
 
 COARSEST = 33
 FINEST = 8193
 MOST_STEPS = 25 * 2**12
+SLOWEST = 0.9  # ratio of changes from mesh to mesh: errors that fall slower are not told from it
 
 
 @tells_scene
@@ -39,9 +42,11 @@ def solve(
     matters; see `continuum.galerkin` and `continuum.spectral`. For slaved headings and linear curvature.
 
     "richardson": second-order differences in s on meshes of spacing k, k/2, k/4, ...; two neighbours u_k, u_{k/2} give
-    T = u_{k/2} + (u_{k/2} - u_k)/3, which removes the k^2 term, and two neighbouring T the estimate of what is left,
-    |T_{k/2} - T_k|/3. (The estimate presumes that the rest falls no slower than k^2. The rod's ends are not smooth - the
-    curvature grows a thin layer there - so it does fall like k^2 rather than k^4; measured in docs/accuracy.md.)
+    T = u_{k/2} + (u_{k/2} - u_k)/3, which removes the k^2 term, and three neighbouring T the estimate of what is left: if
+    changes d = |T_{k/2} - T_k| fall by rho from mesh to mesh, d rho/(1 - rho). rho is measured, between 1/4 and 9/10: the rod's
+    ends are not smooth - the curvature grows a thin layer there - so the rest falls like k^2 rather than k^4 (docs/accuracy.md);
+    where the initial fields have corners it falls slower, and rho is at least 1/2. The coarsest mesh sees the initial fields
+    (`continuum.mesh.unseen`).
     The step of "suzuki4" is halved on the coarsest mesh until its effect is below a quarter of the tolerance; the effect is
     measured again on the finest mesh but one, and is part of the estimate.
 
@@ -85,6 +90,8 @@ def solve(
         problem = semidiscretise(scene, 32 if n is None else n, ends="paper")
         step = min(problem.chain.k**2 / 8, suggest_dt(problem, "leapfrog")) if dt is None else dt
         want = ("modified_energy",) if problem.system.quadratic else ()
+        if warning := unseen(scene, problem):
+            warn(warning)
         return simulate(problem, "leapfrog", dt=step, frames=frames, want=want, progress=progress)
     if n is not None or dt is not None:
         raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
@@ -101,17 +108,21 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: NDArray, progr
     # sweeps stop well below the tolerance: what each step leaves adds up over the steps
     method = Suzuki4(Midpoint(tolerance=min(1e-10, 1e-5 * tol)))
 
+    def mesh(n: int) -> Problem:
+        return semidiscretise(scene, n - 1 if scene.closed else n, "consistent")
+
     def run(n: int, steps: int) -> Solution:
-        nodes = n - 1 if scene.closed else n
-        return simulate(semidiscretise(scene, nodes, "consistent"), method, scene.duration / steps, frames, progress=False)
+        with warnings.catch_warnings():  # steps that are too long are told by half as long ones
+            warnings.simplefilter("ignore")
+            return simulate(mesh(n), method, scene.duration / steps, frames, progress=False)
 
     def largest(a: Solution, b: Solution, factor: float) -> dict[str, float]:
         every = (b.s.size - 1) // (a.s.size - 1) if not scene.closed else b.s.size // a.s.size
         return {f: factor * float(np.abs(getattr(b, f)[:, ::every] - getattr(a, f)).max()) for f in FIELDS}
 
     def effect(whole: Solution, halved: Solution) -> dict[str, float]:
-        """Of a time step, when half of it has at most a quarter of the effect."""
-        return largest(halved, whole, 4 / 3)
+        """Of a time step, when half of it has at most a quarter of the effect; without a bound if sweeps did not converge."""
+        return largest(halved, whole, np.inf if halved.stats["unconverged"] else 4 / 3)
 
     with tqdm(desc=f"field to {tol:g}", unit="run", delay=1, disable=not progress) as bar:
 
@@ -125,15 +136,19 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: NDArray, progr
             bar.update()
             return run(n, steps)
 
-        steps = 25
-        coarse = shown(COARSEST, steps)
-        while over(effect(coarse, halved := shown(COARSEST, 2 * steps)), bound) > 1 / 4:
+        steps, coarsest = 25, COARSEST
+        while coarsest < FINEST and unseen(scene, mesh(coarsest)):
+            coarsest = 2 * coarsest - 1
+        coarse = shown(coarsest, steps)
+        while over(effect(coarse, halved := shown(coarsest, 2 * steps)), bound) > 1 / 4:
             steps, coarse = 2 * steps, halved
-        n, last = COARSEST, None
+        n, last, fastest = coarsest, None, 1 / 2 if resolve(scene).kinks else 1 / 4
+        change = space = unknown = dict.fromkeys(FIELDS, np.inf)
         while n < FINEST:
             fine = shown(2 * n - 1, steps)
             best = _extrapolate(scene, coarse, fine)
-            space = largest(last, best, 1 / 3) if last is not None else dict.fromkeys(FIELDS, np.inf)
+            before, change = change, largest(last, best, 1.0) if last is not None else unknown
+            space = {name: change[name] * _rest(change[name], before[name], fastest) for name in FIELDS}
             if over(space, bound) <= 0.75:
                 # the step again, on the coarser of the two meshes that count: waves may be there that COARSEST does not hold
                 time = effect(coarse, shown(n, 2 * steps))
@@ -143,11 +158,19 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: NDArray, progr
                     return replace(best, error_estimate=estimate, rolling_residual=None, stats=stats)
                 # a smaller step, to fall like its third power if not its fourth, and again from two meshes back
                 steps *= max(2, 2 ** int(np.ceil(np.log(4 * over(time, bound)) / np.log(8))))
-                n = max(COARSEST, (n - 1) // 4 + 1)
-                coarse, last = shown(n, steps), None
+                n = max(coarsest, (n - 1) // 8 + 1)
+                coarse, last, change = shown(n, steps), None, unknown
                 continue
             n, coarse, last = 2 * n - 1, fine, best
     raise ValueError(missed(space, bound, f"on {n} nodes"))
+
+
+def _rest(change: float, before: float, fastest: float) -> float:
+    """What is left of the error, as a part of the last change, where changes fall geometrically; infinite after the first."""
+    if not np.isfinite(before):
+        return np.inf
+    rho = min(max(change / before, fastest), SLOWEST) if change else fastest
+    return rho / (1 - rho)
 
 
 def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:

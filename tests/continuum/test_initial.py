@@ -1,6 +1,8 @@
 """Initial fields: pieces on which they are smooth, energy by quadrature, features; what is refused."""
 
+import re
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -190,3 +192,44 @@ def test_own_headings_may_have_corners():
         )
     )
     assert found.kinks == pytest.approx([1, 3], abs=1e-9)
+
+
+def heard(given, n, ends="springs"):
+    """What `lump` warns of."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        lump(given, n, ends)
+    return " ".join(str(warning.message) for warning in told)
+
+
+@pytest.mark.parametrize(
+    ("given", "few", "enough"),
+    [
+        (scene(bump(0.03)), 65, 193),
+        (scene(bump(0.03), lambda s: 1 + 0 * s), 65, 193),  # the roll of all of it hides the bump's energy in the whole
+        (scene(omega=bump(0.03)), 33, 193),
+        (scene(omega=lambda s: 1 + 0.1 * bump(0.03)(s)), 33, 193),
+        (rolling_rod(mode=12, amplitude=1e-2), 24, 97),
+    ],
+)
+def test_discs_that_are_too_few_to_see_the_data(given, few, enough):
+    """Whether a disc stands on the bump or not: what is missing of the springs' energy is the energy of what is missed."""
+    assert re.search(rf"{few} discs are too few for the initial fields, .* take n = \d+ or more", heard(given, few))
+    assert not heard(given, enough)
+
+
+def test_discs_of_smooth_scenes_are_enough():
+    for smooth in (untwisting_rod(), untwisting_rod("unit", curvature="true"), steered_rod(), breathing_ring(), rolling_rod()):
+        for n in (7, 9, 33):
+            assert not heard(smooth, n)
+    assert not heard(untwisting_rod(), 9, "paper")
+    assert not heard(untwisting_rod(), 9, "consistent")
+    found = resolve(untwisting_rod())
+    lost = 1 - lump(untwisting_rod(), 9).energy() / found.energy
+    assert lost == pytest.approx(1 - np.sinc(1 / 16) ** 2, rel=1e-9)  # of sin^2(pi k/2 l)/(pi k/2 l)^2, said as 1.3 %
+
+
+def test_discs_of_a_jump_have_no_limit():
+    assert "the discs have no limit as a field: initial theta jumps by 1 at s = 2.13" in heard(
+        scene(lambda s: 1.0 * (s > 2.13)), 33
+    )

@@ -156,6 +156,37 @@ def test_data_that_jump_are_refused_by_every_method(method):
         solve(step, 1e-2, method, progress=False)
 
 
+@pytest.mark.parametrize(
+    ("theta", "tol"),
+    [
+        (lambda s: 2.0 * np.abs(s - 1.1), 1e-2),
+        (lambda s: 2.0 * np.abs(s - 1.1), 1e-3),
+        (lambda s: np.exp(-(((s - 2.13) / 0.03) ** 2)), 1e-2),
+        (lambda s: 0.5 * np.tanh((s - 2.13) / 0.05), 1e-2),
+    ],
+    ids=["corner", "corner, tight", "bump", "tanh"],
+)
+@pytest.mark.filterwarnings("ignore:suzuki4. dt = .* is too long")  # half and twice the step give the reference to 1e-4
+def test_estimate_of_meshes_on_rough_data(rolling, theta, tol):
+    """Corners and narrow bumps: the order at which errors fall is measured. Against chains of 1025 and 2049 nodes, extrapolated."""
+    scene = Scene(rod=Rod(**PAPER), duration=1.0, initial=lambda s: (s, 0 * s, theta(s), 0 * s), rolling=rolling)
+    field = solve(scene, tol, "richardson", frames=2, progress=False)
+    method = Suzuki4(Midpoint(tolerance=1e-9))
+    a, b = (simulate(semidiscretise(scene, n, "consistent"), method, 1 / 800, 2, progress=False) for n in (1025, 2049))
+    every = max(1024 // (field.s.size - 1), 1)
+    for name in ("x", "y", "theta"):
+        u, v = getattr(a, name), getattr(b, name)[:, ::2]
+        truth = (v + (v - u) / 3)[:, ::every]
+        error = np.abs(getattr(field, name)[:, :: max((field.s.size - 1) // 1024, 1)] - truth).max()
+        assert error <= field.error_estimate[name] <= tol
+
+
+def test_paper_s_scheme_warns_where_its_points_are_too_few():
+    narrow = Scene(rod=Rod(**PAPER), duration=0.02, initial=lambda s: (s, 0 * s, np.exp(-(((s - 2.13) / 0.03) ** 2)), 0 * s))
+    with pytest.warns(UserWarning, match=r"32 discs are too few for the initial fields, which vary within 0\.03 at s = 2\.13"):
+        solve(narrow, method="leapfrog", progress=False)
+
+
 def test_unreachable_tolerance_is_refused(monkeypatch):
     monkeypatch.setattr("continuum.solver.FINEST", 129)
     with pytest.raises(ValueError, match=r"tol = 1e-06 is not reached on 129 nodes, where the estimated error is"):
