@@ -1,23 +1,22 @@
 """Steps without end: what carries a run from frame to frame, plain or compiled, and stops it when it has gone wrong."""
 
 import sys
-import threading
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from discs.integrators import FixedStep, Integrator, Work
-from discs.integrators.base import Frame
+from discs.integrators.base import Cut, Frame
 from discs.problem import Problem
 from discs.system import Phase, Placed, RollingDiscs
 from discs.trust import SUSPECTED, Watch, converging
 from discs.warn import warn
 
-NOTICE = 2.0  # seconds of compiling after which it is said
+NOTICE = 2.0  # seconds of compiling after which it is said, if kernels are not read from the cache
 _PREPARED: set[tuple[type, type]] = set()
 WATCHED = ("total", "size", "count", "due")  # of a watch, what a run goes on from
-CHUNK = 4_000_000  # discs times steps of a compiled call: some tenths of a second, then progress is shown and Ctrl-C heard
+CHUNK = 4_000_000  # discs times steps of a compiled call, then progress is shown; Ctrl-C is heard in every sweep
 
 
 class SimulationError(RuntimeError):
@@ -93,17 +92,17 @@ class March:
         key = type(self.integrator), type(self.kernel)
         if key in _PREPARED:
             return
-        word = f"compiling {self.integrator.name!r}, once on this machine: some tens of seconds ..."
-        notice = threading.Timer(NOTICE, print, (word,), {"file": sys.stderr, "flush": True})
-        notice.daemon = True
-        if not quiet:
-            notice.start()
-        try:
+        from discs.kernels.compiled import compiling, uncached
+
+        def say() -> None:
+            once = "" if uncached else ", once on this machine"
+            if not quiet:
+                print(f"compiling {self.integrator.name!r}{once}: some tens of seconds ...", file=sys.stderr, flush=True)
+
+        with compiling(say, NOTICE):
             if self.twin is not None:
                 self.twin.march(self.kernel, self.memory, self.h, 0, self.bound)
-            self.observe(self.frame(0.0))
-        finally:
-            notice.cancel()
+            self.observe(self.integrator.at(self.system, self.memory, 0.0, self.h, self.work, self.kernel))
         _PREPARED.add(key)
 
     def keep(self) -> dict[str, Any]:
@@ -129,18 +128,26 @@ class March:
         self.memory = self.integrator.recall(self.memory, of_memory)
 
     def to(self, step: int) -> Iterator[int]:
-        """Go on to a step; yields how many steps were taken at a time."""
+        """Go on to a step; yields how many steps were taken at a time, none where Ctrl-C was heard and did not raise."""
         watch = self.watch
         while self.step < step:
-            before, stuck = self.memory, self.work.unconverged
+            before, cost = self.memory, vars(self.work).copy()
             most = min(self.chunk, step - self.step)
             if watch is not None and watch.due < self.step + most:
                 most = watch.due - self.step or 1
-            taken = self._plain() if self.twin is None else self._compiled(self.twin, most)
-            if self.work.unconverged > stuck:
-                self._remember(before, taken, stuck)
-            if watch is not None and watch.due == self.step:
-                finer = self.integrator.finer(self.system, before, self.h, self.kernel)
+            finer = None
+            try:
+                taken = self._plain() if self.twin is None else self._compiled(self.twin, most)
+                if due := watch is not None and watch.due == self.step:
+                    finer = self.integrator.finer(self.system, before, self.h, self.kernel)
+            except Cut:  # all of this turn is dropped
+                self.memory = before
+                vars(self.work).update(cost)
+                yield 0
+                continue
+            if self.work.unconverged > cost["unconverged"]:
+                self._remember(before, taken, cost["unconverged"])
+            if watch is not None and due:
                 watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
             self.step += taken
             yield taken
@@ -174,7 +181,7 @@ class March:
         return {"converging_dt": min(tried)}
 
     def frame(self, tau: float) -> Frame:
-        """The discs a time 0 <= tau < h after the last step."""
+        """The discs a time 0 <= tau < h after the last step; `Cut` where Ctrl-C was heard and did not raise."""
         stuck = self.work.unconverged
         try:
             frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)

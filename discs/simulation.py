@@ -1,7 +1,8 @@
 """The one door to a run: `simulate(problem, method, ...)`."""
 
 import time as clock
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
 from discs.integrators import Integrator, find, from_settings
-from discs.integrators.base import Frame
+from discs.integrators.base import Cut, Frame
 from discs.marching import March
 from discs.problem import Problem
 from discs.recording import Recording, Rows, kept_settings
@@ -204,15 +205,25 @@ def _run(
             for taken in march.to(before):
                 shown.update(taken)
                 record.pause(f, march)
-            record.write(f, _observed(march, rest, want, bool(offered)))  # not kept here: the next step needs the room
+            frame = partial(_observed, march, rest, want, bool(offered))
+            record.write(f, _uncut(frame, record, f, march))  # not kept here: the next step needs the room
             record.pause(f + 1, march)
         told: dict[str, Any] = about | {"steps": march.step, **vars(march.work)}
         if march.work.unconverged:
             short = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
-            told |= {"short_steps": short} | march.remedy()
+            told |= {"short_steps": short} | _uncut(march.remedy, record, times.size, march)
         if watch is not None:
-            told["step_error"] = march.step_error(rest)
+            told["step_error"] = _uncut(partial(march.step_error, rest), record, times.size, march)
         return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started}, march)
+
+
+def _uncut(call: Callable[[], Any], record: Rows, f: int, march: March) -> Any:
+    """What a call returns; where Ctrl-C cuts it short, and does not raise, it is made again unless the run ends before frame f."""
+    while True:
+        try:
+            return call()
+        except Cut:
+            record.pause(f, march)
 
 
 def _observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """What every integrator is: a small frozen object with a name, an order, a reference and a step."""
 
+import signal
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, final
@@ -40,6 +41,18 @@ class Tally(NamedTuple):
     solves: int
     unconverged: int
     lost: int
+
+
+class Cut(Exception):
+    """A compiled call that Ctrl-C cut short; what it did is dropped, and the memory is that from before."""
+
+
+def tally(found: tuple[int, int, int, int, int]) -> Tally:
+    """What a kernel returned; of one that Ctrl-C ended, `Cut` if Python's handler of it does not raise KeyboardInterrupt itself."""
+    if found[0] < 0:
+        signal.raise_signal(signal.SIGINT)
+        raise Cut
+    return Tally(*found)
 
 
 class Frame(NamedTuple):
@@ -125,7 +138,7 @@ class FixedStep(Integrator):
         """The compiled twin of `steps` times `advance`, for the parameters `system.kernel` of a chain.
 
         Stops after a step whose kinetic energy is not below `bound`, and in one in which a disc loses its heading; where the discs
-        are means nothing then.
+        are means nothing then. Raises `Cut` on Ctrl-C, in every sweep.
         """
 
 
@@ -148,7 +161,7 @@ class OneStep(FixedStep):
     @final
     def march(self, chain: Any, memory: Phase, h: float, steps: int, bound: float) -> tuple[Phase, Tally]:
         z = Phase(memory.hi.copy(), memory.lo.copy(), memory.pi.copy())
-        return z, Tally(*self.kernel(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), h, steps, bound))
+        return z, tally(self.kernel(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), h, steps, bound))
 
     @final
     def advance(self, system: RollingDiscs, memory: Phase, h: float, work: Work) -> Phase:
@@ -163,9 +176,9 @@ class OneStep(FixedStep):
 
         z, lost = memory, -1
         if tau:
-            z, tally = self.march(chain, memory, tau, 1, np.inf)
-            work.add(tally)
-            lost = tally.lost
+            z, done = self.march(chain, memory, tau, 1, np.inf)
+            work.add(done)
+            lost = done.lost
         rate, q = np.empty_like(z.hi), np.empty_like(z.hi)
         energy, slip = methods.look(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), rate, q)
         return Frame(z.hi, z.lo, rate, lost, (q, energy, slip))
@@ -174,7 +187,7 @@ class OneStep(FixedStep):
     def finer(self, system: RollingDiscs, memory: Phase, h: float, chain: Any = None) -> NDArray:
         if chain is not None:
             hi, pi = memory.hi.copy(), memory.pi.reshape(-1, memory.hi.shape[1]).copy()
-            self.kernel(chain, hi, memory.lo.copy(), pi, 0.5 * h, 2, np.inf)
+            tally(self.kernel(chain, hi, memory.lo.copy(), pi, 0.5 * h, 2, np.inf))
             return hi
         work = Work()
         return self.step(system, self.step(system, memory, 0.5 * h, work), 0.5 * h, work).hi

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from numpy.typing import NDArray
 
-from discs.integrators.base import FixedStep, Frame, Tally, Work
+from discs.integrators.base import FixedStep, Frame, Tally, Work, tally
 from discs.integrators.rk4 import RK4
 from discs.system import Phase, RollingDiscs, add
 
@@ -62,7 +62,7 @@ class Leapfrog(FixedStep):
         import discs.kernels.methods as methods
 
         after = TwoStep(*(array.copy() for array in memory))
-        return after, Tally(*methods.leapfrog(chain, *after, h, steps, bound))
+        return after, tally(methods.leapfrog(chain, *after, h, steps, bound))
 
     def at(self, system: RollingDiscs, memory: TwoStep, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         rate = (memory.last + memory.next) / (2 * h)

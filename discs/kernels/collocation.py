@@ -3,7 +3,7 @@
 import numpy as np
 
 from discs.kernels import chain as do
-from discs.kernels.compiled import kernel, part
+from discs.kernels.compiled import interrupted, kernel, part
 from discs.kernels.shared import add, ahead, copy, forward, kinetic, largest, renew
 
 
@@ -85,6 +85,8 @@ def gauss(chain, hi, lo, pi, tableau, h, steps, sweeps, tolerance, bound):
             forward(c, p[i], v[i])
         sweep, moved = 0, np.inf
         while sweep < sweeps and not moved <= tolerance:
+            if interrupted():
+                return -1, gradients, solves, unconverged, -1
             sweep += 1
             # C where the stages are, velocities by it, and forces where these lead
             for i in range(s):

@@ -3,13 +3,14 @@
 Each takes `steps` steps from hi + lo and pi (or what the method remembers), in place, and returns (taken, gradients, solves,
 unconverged, lost): it stops after a step whose kinetic energy is not below `bound`, and in one in which disc `lost` >= 0 loses its
 heading, on the straight way that it went or, if the step did not converge or is explicit, on the way that its velocity pointed (the
-moves of leapfrog are its velocity). Where the discs are means nothing then: the step may not be made, or in part.
+moves of leapfrog are its velocity). Where the discs are means nothing then: the step may not be made, or in part. Nor does it
+where `taken` is -1: Ctrl-C was pressed.
 """
 
 import numpy as np
 
 from discs.kernels import chain as do
-from discs.kernels.compiled import kernel, part
+from discs.kernels.compiled import interrupted, kernel, part
 from discs.kernels.shared import add, ahead, back, copy, forward, kinetic, largest, renew
 
 
@@ -36,6 +37,8 @@ def compose(chain, hi, lo, pi, fractions, h, steps, sweeps, tolerance, bound):
             renew(work.c, p, 0.5 * tau, move, chain.scale, change)
             sweep, change_of_move = 0, np.inf
             while sweep < sweeps and not change_of_move <= tolerance:
+                if interrupted():
+                    return -1, solves, solves, unconverged, -1
                 change_of_move = do.sweep(chain, work, tau, pi, p, move, sweep == 0)
                 sweep += 1
             solves += sweep
@@ -70,6 +73,8 @@ def rk4(chain, hi, lo, pi, h, steps, bound):
     do.settle(chain, work, hi, lo)
     do.lost(chain, work, slope)
     for step in range(steps):
+        if interrupted():
+            return -1, 4 * step, 0, 0, -1
         if do.vanishing(chain):
             do.frame(chain, work, still, c)
             forward(c, pi, move, 0.5 * h)
@@ -109,6 +114,8 @@ def leapfrog(chain, hi, lo, last, following, h, steps, bound):
     do.settle(chain, work, hi, lo)
     do.lost(chain, work, slope)
     for step in range(steps):
+        if interrupted():
+            return -1, step, 0, 0, -1
         add(hi, lo, following, 1.0)
         do.settle(chain, work, hi, lo)
         do.frame(chain, work, still, c)
@@ -155,6 +162,8 @@ def perlmutter(chain, hi, lo, pi, h, steps, sweeps, tolerance, bound):
         back(c, g, pull)
         sweep, moved = 0, np.inf
         while sweep < sweeps and not moved <= tolerance:
+            if interrupted():
+                return -1, step, 0, unconverged, -1
             sweep += 1
             do.frame(chain, work, move, after)
             forward(after, ones, v)

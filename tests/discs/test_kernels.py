@@ -1,6 +1,8 @@
 """The compiled forms against their plain twins, and the linear algebra in them against NumPy."""
 
 import math
+import os
+import shutil
 import subprocess
 import sys
 import time
@@ -10,7 +12,16 @@ import numba
 import numpy as np
 import pytest
 
-from discs import Chain, Midpoint, Problem, State, marching, simulate
+from discs import (
+    Chain,
+    Gauss6,
+    Midpoint,
+    Problem,
+    State,
+    marching,
+    recording,
+    simulate,
+)
 from discs.integrators import METHODS
 from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
@@ -171,21 +182,130 @@ def test_more_discs_than_doubles_can_hold_are_warned_of():
         simulate(problem, dt=0.05, frames=1, progress=False)
 
 
-class Slow(Midpoint):
-    """A midpoint method that takes as long as one that must be compiled."""
+class Loading(Midpoint):
+    """A midpoint method that takes as long as kernels that are read from a slow disc."""
 
     def kernel(self, *arguments):
         time.sleep(0.3)
         return super().kernel(*arguments)
 
 
+class Compiling(Midpoint):
+    """A midpoint method that must be compiled."""
+
+    def kernel(self, *arguments):
+        numba.njit(lambda x: np.sort(x) + x[::-1].sum())(np.ones(3))
+        return super().kernel(*arguments)
+
+
 @pytest.mark.parametrize("progress", [True, False])
-def test_compiling_is_announced_once(progress, monkeypatch, capsys):
+@pytest.mark.parametrize("method", [Loading(), Compiling()])
+def test_compiling_is_announced_once(method, progress, monkeypatch, capsys):
+    problem = uneven(5, Model("springs", "field"))
+    simulate(problem, dt=0.5, frames=1, progress=False)  # all others are compiled
     monkeypatch.setattr(marching, "_PREPARED", set())
-    monkeypatch.setattr(marching, "NOTICE", 0.05)
+    monkeypatch.setattr(marching, "NOTICE", 0.01)
     for _ in range(2):
-        simulate(uneven(5, Model("springs", "field")), Slow(), 0.5, 1, progress=progress)
-    assert capsys.readouterr().err.count("compiling 'midpoint', once on this machine") == progress
+        simulate(problem, method, 0.5, 1, progress=progress)
+    said = capsys.readouterr().err.count("compiling 'midpoint', once on this machine")
+    assert said == (progress and isinstance(method, Compiling))
+
+
+TINY = """
+from discs.kernels.compiled import kernel
+
+@kernel
+def twice(x):
+    return 2 * x
+
+@kernel
+def thrice(x):
+    return 3 * x
+"""
+NO_CACHE = """
+import warnings
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    from discs.kernels import tiny  # line 5
+print([(w.filename, w.lineno, str(w.message)[:31]) for w in told], tiny.twice(21), tiny.thrice(14))
+"""
+
+
+@pytest.mark.parametrize("folder", ["", "cache", "nowhere/cache"])
+def test_without_a_folder_for_the_cache(folder, tmp_path):
+    """A read-only package and no home: __pycache__ is a file, which stops root too."""
+    shutil.copytree(Path(marching.__file__).parent, tmp_path / "discs", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "discs" / "kernels" / "__pycache__").touch()
+    (tmp_path / "discs" / "kernels" / "tiny.py").write_text(TINY)
+    (tmp_path / "nowhere").touch()
+    outside = {"PYTHONPATH": str(tmp_path), "HOME": "/dev/null", "XDG_CACHE_HOME": "", "PYTHONDONTWRITEBYTECODE": "1"}
+    outside |= {"NUMBA_CACHE_DIR": str(tmp_path / folder)} if folder else {}
+    before = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    (tmp_path / "empty").mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", NO_CACHE], env=before | outside, cwd=tmp_path / "empty", capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    kept = folder == "cache"
+    told = [] if kept else [("<string>", 5, "compiled kernels cannot be kept")]
+    assert done.stdout.strip() == f"{told} 42 42"
+    assert bool(list(tmp_path.glob("cache/kernels-*/**/*.nbc"))) == kept
+    assert not list((tmp_path / "empty").iterdir())
+
+
+def pressing(seconds: float):
+    """Another process that presses Ctrl-C: a thread of this one could not, while a compiled call keeps Python to itself."""
+    return subprocess.Popen([sys.executable, "-c", f"import os, time; time.sleep({seconds}); os.kill({os.getpid()}, 2)"])
+
+
+SWEPT = [Midpoint(sweeps=300_000, tolerance=0), Gauss6(sweeps=100_000, tolerance=0)]
+EACH = [METHODS[name]() for name in ("midpoint", "suzuki4", "gauss6", "mclachlan-perlmutter", "rk4", "leapfrog")]
+
+
+@pytest.mark.parametrize(
+    ("method", "h", "frame"),
+    [*((method, 1e-8, 2e-3) for method in EACH), *((method, 1e-3, 1e-3) for method in SWEPT), (SWEPT[0], 2e-3, 1e-3)],
+    ids=lambda value: getattr(value, "name", value),
+)
+def test_ctrl_c_is_heard_within_a_compiled_call(method, h, frame, monkeypatch):
+    """A call of many steps, a step of many sweeps and a frame between steps would all take some ten seconds of the processor."""
+    monkeypatch.setattr(marching, "CHUNK", 10**12)
+    problem = uneven(1000, Model("springs", "field"))
+    simulate(problem, type(method)(), 1e-8, [1e-8, 1.5e-8], progress=False)  # compiled
+    press, started = pressing(0.3), time.process_time()
+    with pytest.raises(KeyboardInterrupt):
+        simulate(problem, method, h, [frame], progress=False)
+    press.wait()
+    assert time.process_time() - started < 3
+
+
+@pytest.mark.parametrize(("sweeps", "steps"), [(2_000, 400), (100_000, 2.5)], ids=["many-steps", "a-frame-between-steps"])
+def test_ctrl_c_within_a_call_keeps_a_checkpoint(sweeps, steps, tmp_path, monkeypatch):
+    """The call is dropped, the memory is that of before, and the run goes on from there to the same bits."""
+    monkeypatch.setattr(marching, "CHUNK", 10**12)
+    problem, h, path = uneven(100, Model("springs", "field")), 1e-3, tmp_path / "run.nc"
+    settled = {"method": Midpoint(sweeps=sweeps, tolerance=0), "dt": h, "frames": np.array([0, h, steps * h]), "progress": False}
+    simulate(problem, Midpoint(), h, [h, 1.5 * h], progress=False)  # compiled
+    whole = simulate(problem, **settled)
+    press = []
+
+    original = recording.Recording.begin
+
+    def begin(self, march):
+        press.append(pressing(0.3))
+        return original(self, march)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(recording.Recording, "begin", begin)
+        patched.setattr(recording, "SECONDS", np.inf)  # no restart file but the last
+        with pytest.raises(KeyboardInterrupt, match=r"holds [12] of 3 frames, and the same call goes on from there"):
+            simulate(problem, **settled, checkpoint=path)
+    press[0].wait()
+    assert (tmp_path / "run.nc.restart").exists()
+    run = simulate(problem, **settled, checkpoint=path)
+    for name in ("x", "y", "theta", "omega", "energy"):
+        assert getattr(run, name).tobytes() == getattr(whole, name).tobytes()
+    assert run.stats["solves"] == whole.stats["solves"]
 
 
 def test_importing_does_not_compile():
