@@ -279,7 +279,7 @@ def test_ctrl_c_is_heard_within_a_compiled_call(method, h, frame, monkeypatch):
     assert time.process_time() - started < 3
 
 
-@pytest.mark.parametrize(("sweeps", "steps"), [(2_000, 400), (100_000, 2.5)], ids=["many-steps", "a-frame-between-steps"])
+@pytest.mark.parametrize(("sweeps", "steps"), [(600, 400), (60_000, 2.5)], ids=["many-steps", "a-frame-between-steps"])
 def test_ctrl_c_within_a_call_keeps_a_checkpoint(sweeps, steps, tmp_path, monkeypatch):
     """The call is dropped, the memory is that of before, and the run goes on from there to the same bits."""
     monkeypatch.setattr(marching, "CHUNK", 10**12)
@@ -291,9 +291,9 @@ def test_ctrl_c_within_a_call_keeps_a_checkpoint(sweeps, steps, tmp_path, monkey
 
     original = recording.Recording.begin
 
-    def begin(self, march):
-        press.append(pressing(0.3))
-        return original(self, march)
+    def begin(self, *arguments):
+        press.append(pressing(0.2))
+        return original(self, *arguments)
 
     with monkeypatch.context() as patched:
         patched.setattr(recording.Recording, "begin", begin)

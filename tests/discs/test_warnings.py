@@ -18,7 +18,7 @@ ROLLING = Problem(LIMP.chain, State(LIMP.initial.x, LIMP.initial.y, LIMP.initial
 ROD = {"length": 4.0, "density": 1.0, "spin_inertia": 1.0, "torsion_stiffness": 0.8, "bending_stiffness": 0.0, "radius": 1.0}
 SCENE = Scene(rod=Rod(**ROD), initial=lambda s: (s, 0 * s, 0.1 * np.cos(s), 0 * s + 1), duration=0.1)
 SMALL = untwisting_chain(5)
-FINE = untwisting_chain(20_001, length=0.2, duration=0.05)  # for doubles
+FINE = untwisting_chain(20_001, length=0.2, duration=0.05, twist=0.0)  # for doubles
 QUIET = {"dt": 0.05, "frames": 2, "progress": False}
 
 
