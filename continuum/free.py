@@ -68,7 +68,7 @@ def free_rod(
     for name, flag in (("closed", closed), ("estimate", estimate)):
         if not isinstance(flag, bool):
             raise ValueError(f"{name} must be True or False; got {flag!r}")
-    if checks.whole("n", n, 1) > MOST_NODES:
+    if checks.whole("n (nodes)", n, 5 if closed else 3) > MOST_NODES:
         raise ValueError(f"n must be at most {MOST_NODES} nodes; got {n}")
     chain = nodes(rod, n, closed)
     duration, h = checks.number("duration", duration, positive=True), checks.number("dt", dt, positive=True)

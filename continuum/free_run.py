@@ -108,9 +108,12 @@ def run(chain: Chain, start: Start, h: float, times: NDArray, bar: tqdm) -> Run:
     """The motion at times, in steps h."""
     r, v, theta, omega = (given.at(chain.s) if given.nodes.shape[1] != chain.n else given.nodes for given in start)
     system = FreeRod(chain, r)
-    with np.errstate(over="ignore", invalid="ignore"):
-        z = State(r, system.admissible(r, v), theta[0], omega[0])
-        watch = Watch(system, chain, z, h)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            z = State(r, system.admissible(r, v), theta[0], omega[0])
+            watch = Watch(system, chain, z, h)
+    except LinAlgError:
+        raise ValueError("r0 or v0 is too large: numbers overflow") from None
     found, step = [], 0
 
     def moved(z: State, h: float, time: float) -> State:
@@ -151,7 +154,7 @@ def compare(rod: Rod, chain: Chain, start: Start, h: float, times: NDArray, fine
         return None, f"free_rod: no estimate of the error: half of n = {chain.n} nodes are too few for a run; take more"
     coarse = nodes(rod, half, ring)
     short = bool(times[-1] < 2 * h * (1 - 1e-12))
-    step = h / 2 if short else 2 * h
+    step = min(h, times[-1] or h) / 2 if short else 2 * h
     at: list[int] = []
     last = -np.inf
     for f, time in enumerate(times):

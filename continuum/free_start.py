@@ -58,9 +58,13 @@ class Given:
     def _read(self, values: ArrayLike, size: int) -> NDArray:
         if self._rows == 1:
             return checks.field(self.name, values, size)[None]
-        if np.shape(values) != (2, size):
+        try:
+            shape = str(np.shape(values))
+        except ValueError:  # x and y of unequal lengths
+            shape = ", ".join(str(np.shape(row)) for row in values)  # type: ignore[union-attr]
+        if shape != str((2, size)):
             asked = f" where s has shape ({size},): it is read between the nodes too" if self.call else ""
-            raise ValueError(f"{self.name} must give x and y, an array of shape {(2, size)}{asked}; got shape {np.shape(values)}")
+            raise ValueError(f"{self.name} must give x and y, an array of shape {(2, size)}{asked}; got shape {shape}")
         return np.array([checks.field(self.name, row, size) for row in values])  # type: ignore[union-attr]
 
     def at(self, s: NDArray, degree: int = DEGREE) -> NDArray:
@@ -133,6 +137,11 @@ def _line(chain: Chain, r: Given, places: NDArray, dr: NDArray, doubt: NDArray) 
         raise ValueError(
             f"r0 must have |r0'| = 1, s being its arc length; got {length[at]:.7g} at s = {places[at]:.4g}, between nodes {at[0]} "
             f"and {(at[0] + 1) % chain.n}: there it is stretched, has a kink, a jump or noise, or n is too small for it"
+        )
+    if r.rounding > UNKNOWN:
+        far = float(np.abs(r.nodes).max())
+        raise ValueError(
+            f"r0 is too far from the origin, {far:.3g}: by rounding |r0'| is known to {r.rounding:.1g} only; shift it nearer"
         )
     # links of an array, or the slopes of a function before and after each node
     before, after = (r.links(),) * 2 if r.call is None else (dr[..., -1], dr[..., 0])
