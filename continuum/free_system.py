@@ -153,6 +153,10 @@ class FreeRod:
         a, b = self.links(before), self.links(after)
         return np.arctan2(a[0] * b[1] - a[1] * b[0], (a * b).sum(axis=0))
 
+    def rate(self, z: State) -> float:
+        """The fastest turn of a link, rad per time."""
+        return float((np.hypot(*self.links(z.v)) / self.length).max())
+
     def advance(self, z: State, h: float) -> State:
         """The state after a step h; LinAlgError if Newton's method does not converge."""
         return State(*self.step(z.r, z.v, h), *self.twist(z.theta, z.omega, h))

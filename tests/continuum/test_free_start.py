@@ -99,6 +99,12 @@ def test_stretched_lines_are_refused(r0, closed, function, array, arrays):
         start(r0, closed=closed, arrays=arrays)
 
 
+def test_nodes_that_are_too_few_to_tell_are_refused():
+    """An arc of two radians on five nodes: splines of any degree leave |r'| open by 7e-4."""
+    with pytest.raises(ValueError, match=r"got 0.9993.* between nodes 0 and 1: .* or n is too small for it"):
+        start(directed(lambda s: s), arrays=True, n=5)
+
+
 @pytest.mark.parametrize("arrays", [False, True])
 @pytest.mark.parametrize(
     ("r0", "v0", "closed", "message"),
