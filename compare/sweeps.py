@@ -2,31 +2,26 @@
 
 import json
 import os
+import pickle
+import threading
 import time as clock
 import traceback
 from collections.abc import Callable, Iterable
-from concurrent.futures import CancelledError, Executor, Future, as_completed
-from contextlib import nullcontext
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
+from contextlib import nullcontext, suppress
+from functools import cached_property, lru_cache
+from multiprocessing import parent_process
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+import cloudpickle
 from tqdm import tqdm
 
-from compare.background import background
+from compare.background import NotStarted, background
+from compare.fingerprint import fingerprint
+from compare.sweep_archive import Archive, Result, key_of, read, record
 
-
-class Result(NamedTuple):
-    """What became of a case.
-
-    case : as given. value : what the function returned, as JSON holds it (arrays and tuples are lists); None if it failed.
-    error : "" or, if it failed, the kind of error and its message. trace : where it failed. seconds : what it took.
-    """
-
-    case: Any
-    value: Any
-    error: str
-    trace: str
-    seconds: float
+__all__ = ["Result", "cores", "read", "sweep"]
 
 
 def sweep(
@@ -38,19 +33,20 @@ def sweep(
 ) -> list[Result]:
     """Call a function for every case.
 
-    A case that fails is reported and does not hold up the others. With an archive each result is written as it arrives, and a
-    sweep that was interrupted or killed takes from it what it has already; what failed is tried again.
+    A case that fails is reported and does not hold up the others, even if it ends its process. With an archive each result is
+    written as it arrives, and a sweep that was interrupted or killed takes from it what it has already; what failed is tried again.
 
     Parameters
     ----------
-    function : takes a case. For other processes it must be importable (no lambda), and a script that calls `sweep` must do so
-        under `if __name__ == "__main__":`.
+    function : takes a case. A lambda, and a function of a notebook or script, is sent to other processes by value. A script that
+        calls `sweep` must do so under `if __name__ == "__main__":`.
     cases : whatever JSON can hold (numbers, strings, lists, dictionaries), all different. What the function returns must be
         so too; NumPy's arrays and numbers become lists and numbers, whether a result is fresh or from the archive.
     executor : any `concurrent.futures` executor. None: as many processes on this machine as there are cores to use. For a cluster,
-        Dask's: `distributed.Client(address).get_executor()`.
+        Dask's: `distributed.Client(address).get_executor()`. Where a case breaks an executor, as it can a ProcessPoolExecutor, the
+        cases that had not ended go on in processes of ours.
     archive : file that keeps the results, a line of JSON each (NaN and infinities as Python writes them). One file belongs to one
-        function; one sweep at a time may use it.
+        function as it is: code, defaults, closure, and what it uses of its module (`compare.fingerprint`). One sweep at a time.
     progress : show a progress bar.
 
     Returns
@@ -59,34 +55,86 @@ def sweep(
 
     Raises
     ------
-    ValueError : for cases that JSON cannot hold or that are there twice, and an archive of another function or that is none.
+    ValueError : for cases that JSON cannot hold or that are there twice, a function that cannot be sent to other processes, an
+        archive of another function or that is none, or one that another sweep writes to.
     """
     cases = list(cases)
-    keys = [_key(case) for case in cases]
+    keys = [key_of(case) for case in cases]
     if len(set(keys)) < len(keys):
         twice = next(key for i, key in enumerate(keys) if key in keys[:i])
         raise ValueError(f"the cases of a sweep must differ; got {twice} twice")
-    name = f"{function.__module__}.{function.__qualname__}" if hasattr(function, "__qualname__") else repr(function)
-    known = {_key(found.case): found for found in read(archive, name)} if archive else {}
-    done = {key: known[key] for key in keys if key in known and not known[key].error}
-    rest = {key: case for key, case in zip(keys, cases, strict=True) if key not in done}
-    processes = nullcontext(executor) if executor else background(min(cores(), len(rest) or 1))
-    with processes as workers, Archive(archive, name) as kept:
-        futures = {workers.submit(_attempt, function, case): key for key, case in rest.items()}
-        try:
-            with tqdm(total=len(cases), initial=len(done), desc="sweep", unit="case", disable=not progress) as bar:
-                for future in as_completed(futures):
-                    key = futures[future]
-                    line = _line(future, rest[key])
-                    kept.write(line)
-                    done[key] = Result(**json.loads(line))
-                    bar.update()
-                    bar.set_postfix(failed=sum(bool(r.error) for r in done.values()), refresh=False)
-        except BaseException:
-            for future in futures:
-                future.cancel()
-            raise
+    with Archive(archive, *_identity(function, archive)) as kept:
+        known = {key_of(found.case): found for found in kept.found}
+        done = {key: known[key] for key in keys if key in known and not known[key].error}
+        rest = {key: case for key, case in zip(keys, cases, strict=True) if key not in done}
+        with tqdm(total=len(cases), initial=len(done), desc="sweep", unit="case", disable=not progress) as bar:
+
+            def took(key: str, line: str) -> None:
+                kept.write(line)
+                done[key] = Result(**json.loads(line))
+                del rest[key]
+                bar.update()
+                bar.set_postfix(failed=sum(bool(r.error) for r in done.values()), refresh=False)
+
+            for given in (executor, None) if executor else (None,):
+                if rest:
+                    with nullcontext(given) if given else background(min(cores(), len(rest))) as workers:
+                        _call(workers, _Sent(function), rest, took)
     return [done[key]._replace(case=case) for key, case in zip(keys, cases, strict=True)]
+
+
+def _identity(function: Callable[[Any], Any], archive: str | Path | None) -> tuple[str, str]:
+    """Name of a function, and what it is; the latter is asked only by an archive."""
+    name = f"{function.__module__}.{function.__qualname__}" if hasattr(function, "__qualname__") else repr(function)
+    if not archive:
+        return name, ""
+    try:
+        return name, fingerprint(function)
+    except ValueError as error:
+        raise ValueError(f"an archive must know its function, and cannot know {name}: {error}; put that into the cases") from None
+
+
+def _call(workers: Executor, function: "_Sent", cases: dict[str, Any], took: Callable[[str, str], None]) -> None:
+    """Call a function for cases by key, and give on the line of each that has ended; those that a broken executor lost are left."""
+    futures: dict[Future[str], str] = {}
+    try:
+        with suppress(BrokenExecutor):
+            for key, case in cases.items():
+                futures[workers.submit(_attempt, function, case)] = key
+        for future in as_completed(futures):
+            with suppress(BrokenExecutor):
+                took(futures[future], _line(future, cases[futures[future]]))
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+
+
+class _Sent:
+    """A function that is sent to other processes by value where they cannot import it, and made once in each."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self.function = function
+
+    @cached_property
+    def content(self) -> bytes:
+        try:
+            return cloudpickle.dumps(self.function)
+        except Exception as error:
+            raise ValueError(
+                f"the function of a sweep cannot be sent to other processes: {type(error).__name__}: {error}"
+            ) from None
+
+    def __call__(self, case: Any) -> Any:
+        return self.function(case)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _received, (self.content,)
+
+
+@lru_cache(1)
+def _received(content: bytes) -> Callable[[Any], Any]:
+    return pickle.loads(content)
 
 
 def cores() -> int:
@@ -94,89 +142,30 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def read(archive: str | Path, function: str | None = None) -> list[Result]:
-    """The results in an archive, the last for each case; none if there is no file yet. A line that a kill cut short is left out.
-
-    Raises ValueError if the file is not an archive, or one of another function than the one named.
-    """
-    path = Path(archive)
-    if not path.exists():
-        return []
-    whole, _, _ = path.read_text(encoding="utf-8").rpartition("\n")
-    try:
-        lines = [json.loads(line) for line in whole.splitlines()]
-        found = {_key(line["case"]): Result(**line) for line in lines[1:]}
-        of = lines[0]["function"] if lines else function
-    except (ValueError, KeyError, TypeError):
-        raise ValueError(f"archive must be a file that a sweep has written, or a new one; {path} is neither") from None
-    if function is not None and of != function:
-        raise ValueError(f"archive {path} holds results of {of}, not of {function}; take another file")
-    return list(found.values())
-
-
-class Archive:
-    """Whole lines at the end of a file: each is written at once and reaches the disc before the next."""
-
-    def __init__(self, path: str | Path | None, function: str) -> None:
-        self._path, self._function = path and Path(path), function
-
-    def __enter__(self) -> "Archive":
-        if not self._path:
-            return self
-        try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = self._path.open("ab+", buffering=0)
-        except OSError as error:
-            raise ValueError(f"archive must be a file that can be written; {self._path} is not: {error.strerror}") from None
-        self._file.seek(0)
-        self._file.truncate(self._file.read().rfind(b"\n") + 1)  # what a kill left of a line
-        if not self._file.tell() or not self._path.stat().st_size:
-            self.write(json.dumps({"function": self._function}))
-        return self
-
-    def write(self, line: str) -> None:
-        """Append a line."""
-        if self._path:
-            self._file.write(f"{line}\n".encode())
-            os.fsync(self._file.fileno())
-
-    def __exit__(self, *error: object) -> None:
-        if self._path:
-            self._file.close()
-
-
-def _key(case: Any) -> str:
-    try:
-        return json.dumps(case, sort_keys=True, default=_plain)
-    except TypeError as error:
-        raise ValueError(f"a case of a sweep must be what JSON can hold; got {case!r}: {error}") from None
-
-
-def _plain(value: Any) -> Any:
-    """NumPy's arrays and numbers as lists and numbers."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} is not something JSON can hold")
-
-
-def _record(case: Any, value: Any = None, error: str = "", trace: str = "", seconds: float = 0.0) -> str:
-    return json.dumps(Result(case, value, error, trace, seconds)._asdict(), default=_plain)
-
-
 def _attempt(function: Callable[[Any], Any], case: Any) -> str:
-    """The line of a case, made where the function runs."""
+    """The line of a case, made where the function runs. Whatever it raises is its own, as SystemExit."""
     begun = clock.perf_counter()
     try:
-        value = function(case)
-        return _record(case, value, seconds=clock.perf_counter() - begun)
-    except Exception as error:
-        what, trace = f"{type(error).__name__}: {error}", traceback.format_exc()
-        return _record(case, None, what, trace, clock.perf_counter() - begun)
+        return record(case, function(case), seconds=clock.perf_counter() - begun)
+    except BaseException as error:
+        here = parent_process() is None and threading.current_thread() is threading.main_thread()
+        if here and isinstance(error, KeyboardInterrupt):
+            raise  # it is the user's, of this process
+        return record(case, None, _words(error), traceback.format_exc(), clock.perf_counter() - begun)
 
 
 def _line(future: Future[str], case: Any) -> str:
     """The line of a case that has ended, even if what ran it has not survived."""
     try:
         return future.result()
+    except (NotStarted, BrokenExecutor):
+        raise
     except (Exception, CancelledError) as error:
-        return _record(case, None, f"{type(error).__name__}: {error}")
+        return record(case, None, _words(error))
+
+
+def _words(error: BaseException) -> str:
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:
+        return f"{type(error).__name__}, whose message cannot be read"

@@ -5,16 +5,24 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from compare import lump, sweep
-from compare.sweeps import read
+from compare.background import Died, background
+from compare.fingerprint import fingerprint
+from compare.sweep_archive import Archive
+from compare.sweeps import _identity, read
 from continuum import untwisting_rod
 from discs import simulate
+from discs.twist import untwisting_chain
 
 
 def end_disc(case):
@@ -60,52 +68,271 @@ def test_a_cluster(one_by_one, tmp_path):
     assert {r.case["n"] for r in read(tmp_path / "sweep.jsonl")} == {5, 9}
 
 
-def test_failures_are_reported_and_tried_again(tmp_path):
+def test_failures_are_reported_and_tried_again(tmp_path, noted):
     file = tmp_path / "new" / "sweep.jsonl"
     with ThreadPoolExecutor(1) as executor:
-        found = sweep(picky, [1, 3, 4, 2], executor, file, progress=False)
-        assert [r.value for r in found] == [1.0, None, None, 4.0]
+        found = sweep(noting, [1, 3, 4, 2], executor, file, progress=False)
+        assert [r.value for r in found] == [1, None, None, 2]
         assert found[1].error == "ValueError: three is refused"
-        assert "in picky" in found[1].trace
+        assert "in noting" in found[1].trace
         assert found[2].error == "TypeError: object is not something JSON can hold"
-        calls = []
-        again = sweep(counted(calls), [1, 3, 4, 2], executor, file, progress=False)
-    assert calls == [3, 4]
-    assert [r.value for r in again] == [1.0, 3, 4, 4.0]
+        assert noted("better") == [1, 3, 4, 2]
+        again = sweep(noting, [1, 3, 4, 2], executor, file, progress=False)
+    assert noted() == [3, 4]
+    assert [r.value for r in again] == [1, 3, 4, 2]
     assert [r.error for r in read(file)] == [""] * 4
 
 
-def counted(calls, module=__name__, name="picky"):
-    """A function with the name of another that notes what it is called with."""
-
-    def function(case):
-        calls.append(case)
-        return case
-
-    function.__module__, function.__qualname__ = module, name
-    return function
+def noting(n):
+    """Notes what it is called with, in a file, and is the same function all the time."""
+    with open(os.environ["NOTED"], "a") as file:
+        file.write(f"{n}\n")
+    if n == 3 and "BETTER" not in os.environ:
+        raise ValueError("three is refused")
+    return object() if n == 4 and "BETTER" not in os.environ else n
 
 
-def test_a_worker_that_dies_is_reported():
-    (found,) = sweep(picky, [5], progress=False)
-    assert found.error.startswith("BrokenProcessPool")
+@pytest.fixture
+def noted(tmp_path, monkeypatch):
+    """The calls of `noting` since it was last asked for them; "better" makes them all succeed from now on."""
+    path = tmp_path / "noted"
+    monkeypatch.setenv("NOTED", str(path))
+
+    def calls(then=""):
+        found = [int(line) for line in path.read_text().split()] if path.exists() else []
+        path.write_text("")
+        if then:
+            monkeypatch.setenv("BETTER", "1")
+        return found
+
+    return calls
 
 
-def test_half_a_line_is_dropped(tmp_path):
-    """As a kill in the middle of writing leaves it: the case is run again, on a line of its own."""
-    file, calls = tmp_path / "sweep.jsonl", []
+DEATHS = {1: "SystemExit: 7", 2: "KeyboardInterrupt: ", 3: "Died: its process ended with exit code 3"}
+DEATHS[4] = "Died: its process ended with signal SIGSEGV"
+
+
+def deadly(n):
+    with open(os.environ["NOTED"], "a") as file:
+        file.write(f"{n}\n")
+    if n == 1:
+        sys.exit(7)
+    if n == 2:
+        raise KeyboardInterrupt
+    if n == 3:
+        os._exit(3)
+    if n == 4:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return n
+
+
+def test_the_death_of_a_case_is_its_own(tmp_path, noted):
+    """However it ends its process: the others have their results, and keep them when it is tried again."""
+    cases, file = [7, 3, 8, 1, 2, 9, 4, 10], tmp_path / "sweep.jsonl"
+    with background(1) as workers:
+        found = sweep(deadly, cases, workers, file, progress=False)
+    assert [r.value for r in found] == [7, None, 8, None, None, 9, None, 10]
+    assert {r.case: r.error for r in found if r.error} == DEATHS
+    calls = noted()
+    assert all(calls.count(n) == 1 for n in (1, 2, 7, 8, 9, 10))
+    assert all(calls.count(n) == 2 for n in (3, 4))  # once more in a process of their own
+    again = sweep(deadly, [7, 3, 8, 9, 10], archive=file, progress=False)
+    assert noted() == [3]
+    assert [r.value for r in again] == [7, None, 8, 9, 10]
+
+
+def test_a_case_that_breaks_an_executor_takes_no_other_with_it(noted):
+    cases = [7, 3, 8, 9]
+    with ProcessPoolExecutor(1, get_context("spawn")) as executor:
+        found = sweep(deadly, cases, executor, progress=False)
+    assert [r.value for r in found] == [7, None, 8, 9]
+    assert found[1].error == DEATHS[3]
+
+
+def leaves(n):
+    """Case 1 leaves something that ends the process of the next."""
+    if n == 1:
+        threading.Timer(0.05, os._exit, (9,)).start()
+    else:
+        time.sleep(0.3)
+    return n
+
+
+def test_what_a_case_leaves_behind_is_not_the_fault_of_the_next():
+    with background(1) as workers:
+        found = sweep(leaves, [1, 2, 3], workers, progress=False)
+    assert [r.value for r in found] == [1, 2, 3]
+
+
+def test_ours_hear_of_what_is_raised_in_another_process():
+    with background() as workers:
+        with pytest.raises(ValueError, match="three is refused") as raised:
+            workers.submit(picky, 3).result()
+        assert "in picky" in raised.value.__notes__[0]
+        assert workers.submit(picky, 2).result() == 4.0
+        with pytest.raises(Died, match="its process ended with exit code 1"):
+            workers.submit(picky, 5).result()
+        assert workers.submit(picky, 2).result() == 4.0
+
+
+def test_functions_are_sent_by_value(tmp_path):
+    """Lambdas, closures, and those of a notebook, whose main module is no file."""
+    factor = np.array([2.0, 3.0])
+    assert [r.value for r in sweep(lambda n: n * factor, [1, 2], progress=False)] == [[2, 3], [4, 6]]
+    code = (
+        "import numpy as np\nfrom compare import sweep\nK = np.arange(3)\ndef helper(n): return n + K[2]\n"
+        f"def cell(n): return helper(n) ** 2\nprint([r.value for r in sweep(cell, [1, 2, 3], archive={str(tmp_path / 'a')!r})])"
+    )
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout == "[9, 16, 25]\n", done.stderr
+    lock = threading.Lock()
+    with pytest.raises(ValueError, match="the function of a sweep cannot be sent to other processes: TypeError"):
+        sweep(lambda n: (n, lock), [1], progress=False)
+
+
+def test_a_script_without_its_guard_is_told(tmp_path):
+    script = tmp_path / "bare.py"
+    script.write_text("from compare import sweep\ndef f(n): return n\nprint(sweep(f, [1, 2, 3], progress=False))\n")
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 1
+    assert "NotStarted: a process ended with exit code 1 at its start; a script must begin this under if __name__" in done.stderr
+    assert not done.stdout
+
+
+def test_functions_that_differ_share_no_archive(tmp_path):
+    file, k = tmp_path / "sweep.jsonl", 3
     with ThreadPoolExecutor(1) as executor:
-        sweep(counted(calls), [1, 2], executor, file, progress=False)
+        sweep(lambda n: n + k, [1], executor, file, progress=False)
+        before = file.read_bytes()
+        assert read(file)[0].value == 4
+        k = 5
+        for other in (lambda n: n + k, lambda n: n - 3, lambda n: n + 3):
+            with pytest.raises(
+                ValueError, match=r"holds results of .*lambda>, which has changed since, or Python has; take another"
+            ):
+                sweep(other, [1], executor, file, progress=False)
+        stream = open(file)  # noqa: SIM115
+        with pytest.raises(ValueError, match="an archive must know its function, and cannot know"):
+            sweep(lambda n: stream.read(n), [1], executor, file, progress=False)
+        stream.close()
+    assert file.read_bytes() == before
+
+
+def made(text):
+    """A function of a module of its own."""
+    module: dict = {"__name__": "users"}
+    exec(text, module)
+    return module["f"]
+
+
+BASE = "import numpy as np\nK = {'a': np.arange(3)}\ndef g(x): return x + 1\nclass C:\n  def m(self): return 1\n"
+F = "def f(n, scale=2.0):\n  def inner(): return [g(n) for _ in range(2)]\n  return K, C().m(), inner(), scale\n"
+
+
+def test_fingerprints():
+    """The same for the same text, in another process too; another one for whatever a function is made of."""
+    same = fingerprint(made(BASE + F))
+    assert same == fingerprint(made(BASE + F)) == fingerprint(made(BASE + "unused = 3\n" + F))
+    changes = [("x + 1", "x + 2"), ("arange(3)", "arange(4)"), ("'a'", "'b'"), ("return 1", "return 2"), ("scale=2.0", "scale=2")]
+    changes += [("range(2)", "range(3)"), ("C().m()", "C().m"), ("g(n)", "g(g)")]
+    others = [fingerprint(made((BASE + F).replace(*change))) for change in changes]
+    assert len({same, *others}) == len(changes) + 1
+    problem = untwisting_chain(5)
+    told = fingerprint(partial(simulate, problem))
+    assert problem.energy() > 0  # which keeps what it has computed
+    assert fingerprint(partial(simulate, problem)) == told == fingerprint(partial(simulate, untwisting_chain(5)))
+    assert fingerprint(partial(simulate, untwisting_chain(6))) != told
+    code = "from tests.compare.test_sweeps import *; print(fingerprint(made(BASE + F)), fingerprint(deadly))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [same, fingerprint(deadly)]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b'{"n": 64}',
+        b'{"n": 64}\n',
+        b"{",
+        b'{"func',
+        b"mine",
+        b"[1]\n[2]",
+        b'{"function": 3}\n',
+        b'{"function": "a"}\n[]\n',
+        b"\xff\n",
+        b'{"function": "a", "x": 1}\n',
+        b"[" * 100_000 + b"\n",
+        b'{"function": "a"}\n{"case": 1}\n',
+        b"\n\n",
+    ],
+    ids=range(13),
+)
+def test_a_file_that_is_no_archive_is_left_alone(content, tmp_path):
+    file = tmp_path / "cfg.json"
+    file.write_bytes(content)
+    with (
+        ThreadPoolExecutor(1) as executor,
+        pytest.raises(ValueError, match="archive must be a file that a sweep has written, or a new"),
+    ):
+        sweep(picky, [1], executor, file, progress=False)
+    with pytest.raises(ValueError, match="archive must be a file that a sweep has written"):
+        read(file)
+    assert file.read_bytes() == content
+
+
+def test_an_archive_of_an_earlier_version_opens(tmp_path):
+    """It does not say what its function was, so that it is read, and not gone on with."""
+    file = tmp_path / "sweep.jsonl"
+    file.write_text(f'{{"function": "{__name__}.picky"}}\n{{"case": 2, "value": 4.0, "error": "", "trace": "", "seconds": 0.1}}\n')
+    assert [r.value for r in read(file)] == [4.0]
+    with pytest.raises(ValueError, match="which may have changed: an earlier version did not keep what it was; take another file"):
+        sweep(picky, [1], archive=file, progress=False)
+
+
+def test_two_sweeps_do_not_share_an_archive(tmp_path):
+    file = tmp_path / "sweep.jsonl"
+    with Archive(file, *_identity(picky, file)), pytest.raises(ValueError, match="is being written by another sweep"):
+        sweep(picky, [1], archive=file, progress=False)
+    with ThreadPoolExecutor(1) as executor:
+        assert sweep(picky, [1], executor, file, progress=False)[0].value == 1
+
+
+def test_what_is_no_file_is_no_archive(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", "/dev/null", tmp_path):
+        with pytest.raises(ValueError, match=r"archive must be a file that can be written; .* is not"):
+            sweep(picky, [1], archive=path, progress=False)
+
+
+def test_results_reach_the_disc(tmp_path, monkeypatch, noted):
+    """Each one, and the archive's name before them."""
+    happened, fsync = [], os.fsync
+
+    def noting_fsync(fd):
+        happened.append(Path(os.readlink(f"/proc/self/fd/{fd}")).name)
+        fsync(fd)
+
+    monkeypatch.setattr(os, "fsync", noting_fsync)
+    with ThreadPoolExecutor(1) as executor:
+        sweep(noting, [1, 2, 5], executor, tmp_path / "sweep.jsonl", progress=False)
+    assert happened[0].startswith(".discs-partial-")
+    assert happened[1:] == [tmp_path.name, *["sweep.jsonl"] * 3]
+
+
+def test_half_a_line_is_dropped(tmp_path, noted):
+    """As a kill in the middle of writing leaves it: the case is run again, on a line of its own."""
+    file = tmp_path / "sweep.jsonl"
+    with ThreadPoolExecutor(1) as executor:
+        sweep(noting, [1, 2], executor, file, progress=False)
         for cut in (1, 5, len(file.read_bytes().splitlines()[-1])):
             file.write_bytes(file.read_bytes()[:-cut])
-            calls.clear()
-            sweep(counted(calls), [1, 2], executor, file, progress=False)
-            assert len(calls) == 1
+            noted()
+            sweep(noting, [1, 2], executor, file, progress=False)
+            assert len(noted()) == 1
             assert len(file.read_text().splitlines()) == 3
-        for header in (b"", b'{"func'):
-            file.write_bytes(header)
-            sweep(counted(calls), [1, 2], executor, file, progress=False)
-            assert [r.case for r in read(file)] == [1, 2]
+        file.write_bytes(b"")  # the user's own, in which nothing is lost
+        sweep(noting, [1, 2], executor, file, progress=False)
+        assert [r.case for r in read(file)] == [1, 2]
 
 
 SLOW = """
@@ -114,6 +341,7 @@ from concurrent.futures import ThreadPoolExecutor
 from compare import sweep
 def slow(n):
     time.sleep(0.05)
+    print(n, flush=True)
     return n
 if __name__ == "__main__":
     sweep(slow, range(int(sys.argv[2])), ThreadPoolExecutor(1) if "threads" in sys.argv else None, sys.argv[1], progress=False)
@@ -124,7 +352,7 @@ def test_a_killed_sweep_resumes(tmp_path):
     script, file = tmp_path / "slow.py", tmp_path / "sweep.jsonl"
     script.write_text(SLOW)
     command = [sys.executable, str(script), str(file)]
-    run = subprocess.Popen([*command, "200", "threads"])
+    run = subprocess.Popen([*command, "200", "threads"], stdout=subprocess.DEVNULL)
     while not file.exists() or len(read(file)) < 3:
         time.sleep(0.02)
         assert run.poll() is None
@@ -132,10 +360,8 @@ def test_a_killed_sweep_resumes(tmp_path):
     run.wait()
     kept = read(file)
     assert 3 <= len(kept) < 200
-    calls = []
-    with ThreadPoolExecutor(1) as executor:  # here, under the name of the killed one's function
-        sweep(counted(calls, "__main__", "slow"), range(len(kept) + 2), executor, file, progress=False)
-    assert calls == [len(kept), len(kept) + 1]
+    done = subprocess.run([*command, str(len(kept) + 2), "threads"], capture_output=True, text=True, check=True)
+    assert [int(n) for n in done.stdout.split()] == [len(kept), len(kept) + 1]
     found = {r.case: r for r in read(file)}
     assert sorted(found) == list(range(len(kept) + 2))
     assert all(found[r.case] == r for r in kept)  # and not run again
@@ -144,7 +370,9 @@ def test_a_killed_sweep_resumes(tmp_path):
 def test_an_interrupt_stops_the_processes_at_once(tmp_path):
     script, file = tmp_path / "slow.py", tmp_path / "sweep.jsonl"
     script.write_text(SLOW)
-    run = subprocess.Popen([sys.executable, str(script), str(file), "2000"], stderr=subprocess.PIPE, text=True)
+    run = subprocess.Popen(
+        [sys.executable, str(script), str(file), "2000"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
     while not file.exists() or len(read(file)) < 3:
         time.sleep(0.02)
         assert run.poll() is None

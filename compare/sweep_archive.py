@@ -1,0 +1,128 @@
+"""The archive of a sweep: a line of JSON that says whose it is, and one for each result."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from discs import files
+
+
+class Result(NamedTuple):
+    """What became of a case.
+
+    case : as given. value : what the function returned, as JSON holds it (arrays and tuples are lists); None if it failed.
+    error : "" or, if it failed, the kind of error and its message. trace : where it failed. seconds : what it took.
+    """
+
+    case: Any
+    value: Any
+    error: str
+    trace: str
+    seconds: float
+
+
+def key_of(case: Any) -> str:
+    """A case as text, the same for the same; ValueError if JSON cannot hold it."""
+    try:
+        return json.dumps(case, sort_keys=True, default=_plain)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"a case of a sweep must be what JSON can hold; got {case!r}: {error}") from None
+
+
+def record(case: Any, value: Any = None, error: str = "", trace: str = "", seconds: float = 0.0) -> str:
+    """The line of a result."""
+    return json.dumps(Result(case, value, error, trace, seconds)._asdict(), default=_plain)
+
+
+def read(archive: str | Path) -> list[Result]:
+    """The results in an archive, the last for each case; none if there is no file yet. A line that a kill cut short is left out.
+
+    Raises ValueError if the file is not an archive.
+    """
+    if not os.path.lexists(archive):
+        return []
+    with open(files.opened(archive), "rb") as file:
+        content = file.read()
+    return _parsed(archive, content)[1] if content else []
+
+
+def _parsed(path: str | Path, content: bytes) -> tuple[dict[str, str], list[Result], int]:
+    """What an archive says of its function, its results, and how many of its bytes are whole lines."""
+    whole = content.rfind(b"\n") + 1
+    try:
+        first, *lines = content[:whole].decode().split("\n")[:-1]
+        of = json.loads(first)
+        if not isinstance(of, dict) or not of.keys() <= {"function", "content"} or not isinstance(of["function"], str):
+            raise ValueError
+        found = {key_of(result.case): result for result in (Result(**json.loads(line)) for line in lines)}
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise ValueError(f"archive must be a file that a sweep has written, or a new one; {path} is neither") from None
+    return of, list(found.values()), whole
+
+
+class Archive:
+    """Whole lines at the end of a file: each is written at once and reaches the disc before the next.
+
+    A file that is no archive, of another function, or in use by another sweep is refused and left as it is; None keeps nothing.
+
+    Attributes
+    ----------
+    found : the results that are there.
+    """
+
+    def __init__(self, path: str | Path | None, function: str, content: str) -> None:
+        self._path, self._of = path and Path(path), {"function": function, "content": content}
+        self.found: list[Result] = []
+
+    def __enter__(self) -> "Archive":
+        if not self._path:
+            return self
+        try:
+            if not os.path.lexists(self._path) or not self._path.stat().st_size:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                with files.fresh(self._path) as new:  # never half a first line
+                    new.write(f"{json.dumps(self._of)}\n".encode())
+            self._fd = files.opened(self._path, os.O_RDWR)
+        except (OSError, ValueError) as error:
+            raise ValueError(f"archive must be a file that can be written; {self._path} is not: {error}") from None
+        try:
+            self._take(self._path)
+        except BaseException:
+            os.close(self._fd)
+            raise
+        return self
+
+    def _take(self, path: Path) -> None:
+        if not files.lock(self._fd):
+            raise ValueError(f"archive {path} is being written by another sweep: wait for its end, or take another file")
+        with open(os.dup(self._fd), "rb") as file:
+            of, self.found, whole = _parsed(path, file.read())
+        if of["function"] != self._of["function"]:
+            raise ValueError(f"archive {path} holds results of {of['function']}, not of {self._of['function']}; take another file")
+        if of != self._of:
+            why = (
+                "has changed since, or Python has"
+                if "content" in of
+                else "may have changed: an earlier version did not keep what it was"
+            )
+            raise ValueError(f"archive {path} holds results of {of['function']}, which {why}; take another file")
+        os.ftruncate(self._fd, whole)  # what a kill left of a line
+        os.lseek(self._fd, 0, os.SEEK_END)
+
+    def write(self, line: str) -> None:
+        """Append a line."""
+        if self._path:
+            files.write_all(self._fd, f"{line}\n".encode())
+            os.fsync(self._fd)
+
+    def __exit__(self, *error: object) -> None:
+        if self._path:
+            files.release(self._fd)
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's arrays and numbers as lists and numbers."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is not something JSON can hold")
