@@ -32,8 +32,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from discs.mechanics import MechanicalSystem
+from discs.mechanics.sizes import dense, units
 
-RANK = 1e-9  # of N, relative to its largest singular value
+RANK = 1e-9  # singular values of N, with rows and columns of norm 1, below this count as 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +97,11 @@ def nonholonomic_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v
     for time, (q_now, v_now) in zip(t, path, strict=True):
         x = _generators(system, q_now)
         n = np.asarray(system.constraint(q_now) @ x)
+        left, sizes, right = np.linalg.svd(n, full_matrices=False)
+        rank = _rank(system, q_now, n, x)
         turning = _generators_rate(system, q_now, v_now)
         n_rate = np.asarray(system.constraint_rate(q_now, v_now) @ x + system.constraint(q_now) @ turning)
-        inverse = np.linalg.pinv(n, rcond=RANK)
+        inverse = (right[:rank].T / sizes[:rank]) @ left[:, :rank].T
         projector = np.eye(x.shape[1]) - inverse @ n
         if round(float(np.trace(projector))) != len(start):
             raise ValueError(
@@ -116,9 +119,18 @@ def nonholonomic_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v
 def admissible_symmetries(system: MechanicalSystem, q: ArrayLike) -> NDArray:
     """A basis of g^q, the symmetries xi with A xi_Q = 0 at q, (k, g)."""
     q = np.asarray(q, dtype=float)
-    n = np.asarray(system.constraint(q) @ _generators(system, q))
-    _, sizes, directions = np.linalg.svd(n)
-    return directions[int((sizes > RANK * sizes[0]).sum()) :]
+    x = _generators(system, q)
+    n = np.asarray(system.constraint(q) @ x)
+    return np.linalg.svd(n)[2][_rank(system, q, n, x) :]
+
+
+def _rank(system: MechanicalSystem, q: NDArray, n: NDArray, x: NDArray) -> int:
+    """Rank of N = A X, whatever the units: rows of A and columns of X of norm 1 in coordinates of mass 1."""
+    unit = units(system, q)
+    rows = np.linalg.norm(dense(system.constraint(q)) * unit, axis=1)
+    columns = np.linalg.norm(x / np.where(unit > 0, unit, 1.0)[:, None], axis=0)
+    scaled = n / np.where(rows > 0, rows, 1.0)[:, None] / np.where(columns > 0, columns, 1.0)
+    return int((np.linalg.svd(scaled, compute_uv=False) > RANK).sum())
 
 
 def _generators_rate(system: MechanicalSystem, q: NDArray, v: NDArray) -> NDArray:

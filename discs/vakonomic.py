@@ -34,6 +34,8 @@ The equations are those of `MechanicalSystem.accelerations` and `integrate`, whi
 many, and nonholonomic.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import null_space
@@ -41,20 +43,30 @@ from scipy.linalg import null_space
 from discs import checks
 from discs.lagrange import frames, lagrange_dalembert
 from discs.mechanics import MechanicalSystem, Trajectory
+from discs.mechanics.sizes import dense, units
 from discs.problem import Problem
+
+FLAT = 1e-9  # of the terms of G mu: a field that is weaker counts as none
 
 
 def solve(
-    system: MechanicalSystem, q: ArrayLike, v: ArrayLike, times: ArrayLike, mu: ArrayLike | None = None, tol: float = 1e-11
+    system: MechanicalSystem,
+    q: ArrayLike,
+    v: ArrayLike,
+    times: ArrayLike,
+    mu: ArrayLike | None = None,
+    tol: float = 1e-11,
+    **options: Any,
 ) -> Trajectory:
     """The motion from q, v at times[0]: nonholonomic without mu, vakonomic with the initial multipliers mu.
 
     Parameters
     ----------
     system, q, v, times, mu : as for `MechanicalSystem.integrate`, which this is.
-    tol : its rtol. A q. = 0 is an invariant of the equations, kept to about this.
+    tol : its rtol. A q. = 0 is an invariant of the equations.
+    options : its `method`, `atol`, `progress`.
     """
-    return system.integrate(q, v, times, tol, mu)
+    return system.integrate(q, v, times, tol, mu, **options)
 
 
 def agreeing_multipliers(system: MechanicalSystem, q: ArrayLike, v: ArrayLike) -> NDArray:
@@ -63,9 +75,20 @@ def agreeing_multipliers(system: MechanicalSystem, q: ArrayLike, v: ArrayLike) -
     N spans the admissible displacements, the null space of A. For a disc that turns or rolls, d = 1 of c = 2: the mu across its
     axle.
     """
-    q = checks.vector("q", q, len(system.names))
-    a = system.constraint(q)
-    return null_space(null_space(a if isinstance(a, np.ndarray) else a.toarray()).T @ system.magnetic(q, v))
+    q, v = (checks.vector(name, given, len(system.names)) for name, given in (("q", q), ("v", v)))
+    if not system.owners:
+        return np.zeros((0, 0))
+    unit = units(system, q)  # of coordinates of mass 1, so that units do not matter
+    a = dense(system.constraint(q)) * unit
+    norms = np.linalg.norm(a, axis=1)
+    field = system.magnetic(q, v) * unit[:, None] / norms
+    # G is the difference of two terms; one of them, A. of the directions of mass 1, tells what counts as 0
+    slopes = [dense(system.constraint_rate(q, unit * e)) * unit / norms[:, None] for e in np.eye(len(q))]
+    size = float(np.max([np.abs(s).max() for s in slopes])) * float(np.linalg.norm(v / unit))
+    across = null_space(a).T @ field
+    _, sizes, directions = np.linalg.svd(across)
+    rank = int((sizes > FLAT * size).sum())
+    return np.linalg.qr(directions[rank:].T / norms[:, None])[0]
 
 
 def rolling_disc(

@@ -9,6 +9,7 @@ from discs.integrators.leapfrog import TwoStep
 from discs.lagrange import frames, lagrange_dalembert
 from discs.mechanics import MechanicalSystem
 from discs.momentum import admissible_symmetries, nonholonomic_momenta, symmetry_momenta
+from discs.vakonomic import agreeing_multipliers
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 from tests.discs.test_integrators import ADAPTIVE, moved, tight
 from tests.discs.test_textbook import CLOSED, TIMES
@@ -201,6 +202,28 @@ def test_pieces_and_rings():
     shifted = {name: getattr(ring.chain, name) for name in ring.chain.__dataclass_fields__} | {"shift": (3.1, 0.0)}
     problem = Problem(type(ring.chain)(**shifted), ring.initial, 1.0)
     assert lagrange_dalembert(problem).symmetry(frames(problem)[0]).shape == (21, 3)  # turning it is none
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e6])
+def test_units_do_not_matter_for_what_the_constraints_leave(length):
+    """Two wheels, lengths in other units: one direction, to roll about the same point; a row's unit is not its rank."""
+    problem = two_wheels()
+    system, (q, v) = lagrange_dalembert(problem, dense=True), frames(problem)
+    units = np.array([length if name[0] in "xy" else 1.0 for name in system.names])
+    other = MechanicalSystem(
+        system.names,
+        system.owners,
+        lambda q: system.mass(q) * units * units[:, None],
+        lambda q: system.potential(q * units),
+        lambda q, v: system.force(q * units, v * units) * units,
+        lambda q: system.constraint(q * units) * units,
+        lambda q, v: system.constraint_rate(q * units, v * units) * units,
+        system.drive,
+        lambda q: system.symmetry(q * units) / units[:, None],
+    )
+    (xi,), (expected,) = admissible_symmetries(other, q / units), admissible_symmetries(system, q)
+    np.testing.assert_allclose(xi * np.sign(xi @ expected), expected, atol=1e-6)
+    assert agreeing_multipliers(other, q / units, v / units).shape == agreeing_multipliers(system, q, v).shape
 
 
 def test_bad_input_is_refused():
