@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from continuum.initial import Resolved
 
-REACH = 3.0  # of a centre, in widths of its feature
-CROWD = 0.6  # of a centre: by how much its share of xi exceeds that of the whole rod
+REACH = 2.0  # of a centre, in widths of its feature
+CROWD = 0.3  # of a centre: its share of xi, over that of the whole rod
 
 
 @dataclass(frozen=True)

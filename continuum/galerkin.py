@@ -67,7 +67,7 @@ class SpectralRod(SkewGradient):
 
     Attributes
     ----------
-    unit : whether rolling is by the unit law.
+    unit, closed : whether rolling is by the unit law, and whether the rod is closed.
     twist : (n,), the moment f of the initial twist.
     start : the initial state.
     """
@@ -77,6 +77,7 @@ class SpectralRod(SkewGradient):
 
     def __init__(self, scene: Scene, n: int, density: Density | None = None) -> None:
         rod = scene.rod
+        self.closed = scene.closed
         self.n, self.unit, self._radius, self._scene = n, scene.rolling == "unit", rod.radius, scene
         self.basis = (waves if scene.closed else polynomials)(n, density or Density(rod.length))
         self.scale = np.array([rod.length, rod.length, 1.0])

@@ -7,7 +7,8 @@ third of the last one, shorter steps on the same functions show which of the two
 falls again and the functions go back by a size.
 
 The finer motion errs too. With a ratio p of its error to that of the coarser one the difference d is (1 - p) times the error, so
-the estimate is d/(1 - p): p from the last two differences, at least 1/3, and 1/2 where there is only one. (The corner s = 0, t = 0,
+the estimate is d/(1 - p): p from the last two differences, at least 1/3, and 1/2 where there is only one (4/5 where initial fields
+are narrow, as functions that do not hold them change little). (The corner s = 0, t = 0,
 where the initial twist breaks a condition of the ends, leaves waves of wave number q and size q^-6 or less in theta: errors fall
 like a power in the end, of the steps like their third.)
 """
@@ -24,15 +25,15 @@ from continuum.density import Density
 from continuum.galerkin import SpectralRod
 from continuum.initial import resolve
 from continuum.rod import Scene
-from continuum.stepping import Steps, TooFast, coarser, finer, sweeps
+from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
 from discs import SimulationError, Solution
 
-SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259)  # functions; odd, as a series has one more cosine than sines
+SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
 NODES = 1025  # of a solution, so many that splines through them do for derivatives too; more where initial fields are narrow
 MOST_NODES = 8192
 FIRST_FACTOR = 2.0
 MORE = (3e-4, 3e-6, 3e-8)  # tolerances below which the search begins one size further
-FIRST = 0.5  # of the tolerance: that of a step in the first motion
+FIRST, LOOSEST = 0.5, 2e-4  # the tolerance of a step in the first motion: so much of that of the fields, at most this
 FAR = 100.0  # times the tolerance: errors above that are not yet for shorter steps to mend
 SLOW = 1 / 3  # of the last error: one above that falls slowly
 LEAST, UNKNOWN, MOST = 1 / 3, 0.5, 0.8  # what a finer motion errs by, over the error of the coarser one
@@ -61,11 +62,17 @@ class Course:
     Parameters
     ----------
     times : (F,), when fields are compared and given.
+    stages : of steps.
     compiled : whether steps are taken by `continuum.kernels`, or by their plain twin.
+
+    Attributes
+    ----------
+    s : (S,), where fields are given.
+    narrow : whether initial fields have features narrower than a 20th of the length.
     """
 
-    def __init__(self, scene: Scene, times: NDArray, compiled: bool = True) -> None:
-        self._scene, self._times, self._compiled = scene, times, compiled
+    def __init__(self, scene: Scene, times: NDArray, stages: int, compiled: bool = True) -> None:
+        self._scene, self._times, self._compiled, self.stages = scene, times, compiled, stages
         initial, length = resolve(scene), scene.rod.length
         narrowest = min((width for _, width in initial.features), default=length)
         nodes = NODES - 1
@@ -73,11 +80,12 @@ class Course:
             nodes *= 2
         self.s = length / nodes * np.arange(nodes + (not scene.closed))
         self._density = Density.of(initial)
+        self.narrow = bool(initial.features)
         self._first = scene.duration / 16  # step to begin with
 
     def run(self, n: int, tolerance: float) -> Motion:
         rod = SpectralRod(self._scene, n, self._density)
-        steps = Steps(rod, self._scene.duration, tolerance, self._first, self._compiled)
+        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._compiled)
         at, initial = rod.reader(self.s), self._scene.fields(self.s)
         begun = at(rod.start)
         rows: dict[str, list] = {}
@@ -126,7 +134,8 @@ class Search:
     """
 
     def __init__(self, scene: Scene, bound: Mapping[str, float], times: NDArray, bar: tqdm) -> None:
-        self.course, self._bound, self._bar = Course(scene, times), bound, bar
+        self._bound, self._bar = bound, bar
+        self.course = Course(scene, times, stages_for(min(bound.values())))
         self.estimate = dict.fromkeys(FIELDS, np.inf)
         self._change = np.inf  # of the last two motions, over its bound
 
@@ -135,7 +144,9 @@ class Search:
         tol = min(self._bound.values())
         start = sum(tol < below for below in MORE)
         sizes = SIZES[min(start, len(SIZES) - 2) :]
-        tolerance, finest = FIRST * tol, finer(finer(FIRST * tol))
+        tolerance = min(FIRST * tol, LOOSEST)
+        stages = self.course.stages
+        finest = finer(finer(tolerance, stages), stages)
         last, failure, blameless = None, None, 0.0
         for n, fewer in zip(sizes, (sizes[0], *sizes), strict=False):
             try:
@@ -148,16 +159,16 @@ class Search:
                         shorter = self._run(n, found.tolerance / float(np.clip(2 * self._change, 4.0, 30.0)))
                         by_steps = over(distances(found.fields, shorter.fields), self._bound)
                         if by_steps > SLOW * self._change:  # shorter steps then, and functions as before
-                            last, found = self._run(fewer, coarser(shorter.tolerance)), shorter
+                            last, found = self._run(fewer, coarser(shorter.tolerance, stages)), shorter
                             if self._reached(last, found):
                                 return last
-                            tolerance, finest = shorter.tolerance, finer(shorter.tolerance)
+                            tolerance, finest = shorter.tolerance, finer(shorter.tolerance, stages)
             except SimulationError as error:
-                if failure and error.message == failure.message and abs(error.time - failure.time) <= SAME * failure.time:
-                    raise
+                if failure and abs(error.time - failure.time) <= SAME * failure.time:
+                    raise failure if isinstance(error, TooFast) else error from None
                 failure, last, self._change = error, None, np.inf
                 continue
-            last, tolerance = found, max(finer(tolerance), finest)
+            last, tolerance = found, max(finer(tolerance, stages), finest)
         if failure:
             raise failure
         raise ValueError(missed(self.estimate, self._bound, f"on {sizes[-1]} functions"))
@@ -171,12 +182,13 @@ class Search:
         """Whether the coarser motion is within the bounds."""
         change = distances(coarse.fields, fine.fields)
         before, self._change = self._change, over(change, self._bound)
-        ratio = float(np.clip(self._change / before, LEAST, MOST)) if np.isfinite(before) else UNKNOWN
+        first = MOST if self.course.narrow else UNKNOWN
+        ratio = float(np.clip(self._change / before, LEAST, MOST)) if np.isfinite(before) else first
         self.estimate = {name: max(error / (1 - ratio), coarse.start[name]) for name, error in change.items()}
         if over(self.estimate, self._bound) > 1:
             return False
         if fine.tolerance >= coarse.tolerance:  # both err alike by their steps
-            shorter = self._run(coarse.n, finer(coarse.tolerance))
+            shorter = self._run(coarse.n, finer(coarse.tolerance, self.course.stages))
             by_steps = distances(coarse.fields, shorter.fields)
             self.estimate = {name: error + by_steps[name] / (1 - LEAST) for name, error in self.estimate.items()}
         return over(self.estimate, self._bound) <= 1

@@ -7,9 +7,10 @@ where the motion is smooth; waves that a step does not resolve spoil the ends to
 sweeps, makes the next one shorter.
 
 Long steps must not jump over the end of a motion: under the unit law a heading is lost where z = r' vanishes, at a point or, when a
-ring collapses, everywhere. A step in which Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at a node is taken again with half its length. So
-|r'| at most halves in a step, and once it is below `LOST_HEADING` before such a step the heading is lost. No other motion ends:
-where steps become too short without that, the motion is too fast for them.
+ring collapses, everywhere. A step in which Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at a node, or where z is nearest to zero on the
+straight way from a node to the next, is taken again with half its length. So the least |r'| at most halves in a step, and once it
+is below `LOST_HEADING` before such a step the heading is lost. No other motion ends: where steps become too short without that, the
+motion is too fast for them.
 """
 
 from collections.abc import Iterator
@@ -25,28 +26,28 @@ from discs.integrators.gauss import tableau
 from discs.kernels.limits import LOST_HEADING
 from discs.system import Phase
 
-STAGES = ((1e-5, 4), (2e-7, 6), (2e-9, 8), (0.0, 12))  # from which tolerance on
+STAGES = ((7e-5, 4), (1.4e-6, 6), (1.4e-8, 8), (0.0, 12))  # from which tolerance of the fields on
 SWEEPS = 40
 FEW_SWEEPS = 18  # steps that take more are made shorter
 MODES = 0.4  # sweeps that new modes cost, times stages over functions
-ACCEPTED = 4.0  # times the tolerance
+ACCEPTED = 2.0  # times the tolerance
 SHORTEST = 1e-9  # of the duration
 MOST_STEPS = 2**14
 
 
-def stages(tolerance: float) -> int:
-    """Stages of a step for a tolerance."""
-    return next(number for least, number in STAGES if tolerance >= least)
+def stages_for(tol: float) -> int:
+    """Stages of the steps for fields to a tolerance. Tolerances of steps are comparable for equal numbers of stages only."""
+    return next(number for least, number in STAGES if tol >= least)
 
 
-def finer(tolerance: float) -> float:
+def finer(tolerance: float, stages: int) -> float:
     """A tolerance for which steps are about 1.5 times shorter, by their order s/2; errors of order 3 then fall to a third."""
-    return tolerance / min(1.5 ** (stages(tolerance) / 2 + 1), 8.0)
+    return tolerance / min(1.5 ** (stages / 2 + 1), 8.0)
 
 
-def coarser(tolerance: float) -> float:
+def coarser(tolerance: float, stages: int) -> float:
     """A tolerance for which they are as much longer."""
-    return tolerance**2 / finer(tolerance)
+    return tolerance**2 / finer(tolerance, stages)
 
 
 def sweeps(tolerance: float) -> float:
@@ -64,7 +65,7 @@ class Steps:
     Parameters
     ----------
     duration : to which steps are taken.
-    tolerance : of a step.
+    tolerance, stages : of a step.
     first : length of the first step that is tried.
     compiled : whether steps are taken by `continuum.kernels`, or by their plain twin.
 
@@ -73,9 +74,11 @@ class Steps:
     lengths : of the steps taken.
     """
 
-    def __init__(self, rod: SpectralRod, duration: float, tolerance: float, first: float, compiled: bool = True) -> None:
+    def __init__(
+        self, rod: SpectralRod, duration: float, tolerance: float, stages: int, first: float, compiled: bool = True
+    ) -> None:
         self.rod, self._duration, self._tolerance, self._compiled = rod, duration, tolerance, compiled
-        self._stages = stages(tolerance)
+        self._stages = stages
         self._sweeps = sweeps(tolerance)
         nodes, _ = legendre.leggauss(self._stages)
         self._series = np.linalg.inv(legendre.legvander(nodes, self._stages - 1))[-2:]  # of the rates of the stages
@@ -131,7 +134,7 @@ class Steps:
 
     def _advance(self, t: float, z: Phase) -> tuple[float, Phase]:
         """One step from z at t that converges and is within the tolerance."""
-        slopes = self.rod.slopes(z)
+        slopes = self._slopes(z)
         while True:
             left = self._duration - t
             h = left if self._next >= 0.9999 * left else min(self._next, left / 2)
@@ -158,7 +161,16 @@ class Steps:
 
     def _turned(self, slopes: NDArray, after: Phase) -> bool:
         """Whether a heading may have been lost within a step, from slopes (n,) before it."""
-        return self.rod.unit and bool(((slopes.conj() * self.rod.slopes(after)).real < 0.5 * np.abs(slopes) ** 2).any())
+        if not self.rod.unit:
+            return False
+        part = _nearest(slopes)
+        now, then = (z[:-1] + part * np.diff(z) for z in (slopes, self._slopes(after)))
+        return bool(((now.conj() * then).real < 0.5 * np.abs(now) ** 2).any())
+
+    def _slopes(self, z: Phase) -> NDArray:
+        """r' at the nodes; around a closed rod, to the first again."""
+        slopes = self.rod.slopes(z)
+        return np.append(slopes, slopes[0]) if self.rod.closed else slopes
 
     def _error(self, v: NDArray, h: float) -> float:
         """Size of the highest coefficient in time of x, y, theta; of the last but one where that is far larger."""
@@ -168,10 +180,17 @@ class Steps:
         return float(max(sizes[1], 0.03 * sizes[0]))
 
     def _check_heading(self, slopes: NDArray, t: float) -> None:
-        node = int(np.argmin(np.abs(slopes)))
-        if self.rod.unit and not abs(slopes[node]) > LOST_HEADING:
+        least = np.abs(slopes[:-1] + _nearest(slopes) * np.diff(slopes))
+        node = int(np.argmin(least))
+        if self.rod.unit and not least[node] > LOST_HEADING:
             message = "the rod lost its heading: r' = 0, and rolling='unit' has no direction there"
             raise SimulationError(message, len(self.lengths), t, node)
 
     def _too_fast(self, t: float) -> TooFast:
         return TooFast("steps do not converge, however short: the motion is too fast for them", len(self.lengths), t, 0)
+
+
+def _nearest(slopes: NDArray) -> NDArray:
+    """Where r' is nearest to zero on the straight way from each node to the next, in [0, 1], (n - 1,)."""
+    move = np.diff(slopes)
+    return np.clip(-(slopes[:-1].conj() * move).real / np.maximum(np.abs(move) ** 2, 1e-300), 0.0, 1.0)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from continuum import Scene, breathing_ring, exact, solve, stepping, untwisting_rod
+from continuum import Rod, Scene, breathing_ring, exact, solve, stepping, untwisting_rod
 from continuum.galerkin import SpectralRod
 from continuum.spectral import Course
-from continuum.stepping import Steps
+from continuum.stepping import Steps, stages_for
 from discs import SimulationError
 from discs.kernels import limits
 
@@ -18,7 +18,7 @@ def largest(a, b):
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
 def test_a_motion_errs_by_about_the_tolerance_of_its_steps(rolling, tolerance):
     """The paper's scene on 37 functions against steps of a far smaller tolerance; every number of stages."""
-    course = Course(untwisting_rod(rolling), np.array([2.0, 4.5]))
+    course = Course(untwisting_rod(rolling), np.array([2.0, 4.5]), stages_for(3 * tolerance))
     error = largest(course.run(37, tolerance).fields, course.run(37, 1e-3 * tolerance).fields)
     assert 0.03 * tolerance < error < 20 * tolerance
 
@@ -26,7 +26,7 @@ def test_a_motion_errs_by_about_the_tolerance_of_its_steps(rolling, tolerance):
 def test_frames_do_not_change_the_motion():
     scene = untwisting_rod()
     rod = SpectralRod(scene, 27)
-    few, many = (Steps(rod, 4.5, 1e-4, 0.3) for _ in range(2))
+    few, many = (Steps(rod, 4.5, 1e-4, 4, 0.3) for _ in range(2))
     (end,) = few.at(np.array([4.5]))
     states = list(many.at(np.linspace(0, 4.5, 31)))
     assert few.lengths == many.lengths
@@ -37,7 +37,7 @@ def test_frames_do_not_change_the_motion():
 
 def test_both_engines_agree(rolling):
     times = np.array([0.0, 1.3, 4.5])
-    a, b = (Course(untwisting_rod(rolling, length=3.0, radius=0.8), times, compiled).run(15, 1e-4) for compiled in (True, False))
+    a, b = (Course(untwisting_rod(rolling, length=3.0, radius=0.8), times, 4, compiled).run(15, 1e-4) for compiled in (True, False))
     assert a.steps == b.steps
     for name, value in a.fields.items():
         np.testing.assert_allclose(value, b.fields[name], atol=1e-6, err_msg=name)
@@ -68,11 +68,29 @@ def test_a_ring_s_collapse_is_told_from_steps_that_are_too_long(omega):
         assert 0 < collapse - caught.value.time < early * collapse
 
 
+def test_a_heading_lost_between_two_nodes():
+    """A line bent by 190 degrees whose r' vanishes at one place: found there by every number of functions, and soon."""
+    length = 5.6
+
+    def bent(s):
+        u, w = np.polynomial.legendre.leggauss(30)
+        places = np.outer(s, (u + 1) / 2)
+        z = np.exp(0.59j * (places - length / (2 * np.pi) * np.sin(2 * np.pi * places / length))) @ w * s / 2
+        return z.real, z.imag, -0.11 * np.cos(np.pi * s / length), 0.07 * np.cos(np.pi * s / length)
+
+    rod = Rod(length=length, density=1.66, spin_inertia=0.68, torsion_stiffness=0.66, bending_stiffness=1.35, radius=0.31)
+    for tol in (1e-3, 1e-6):
+        with pytest.raises(SimulationError, match="lost its heading") as caught:
+            solve(Scene(rod=rod, initial=bent, duration=9.0, rolling="unit"), tol, frames=2, progress=False)
+        assert 6.0 < caught.value.time < 6.5
+        assert caught.value.step < 500
+
+
 def test_headings_are_lost_at_the_discs_threshold():
     assert stepping.LOST_HEADING is limits.LOST_HEADING
     scene = breathing_ring("unit", duration=30.0)
     rod = SpectralRod(scene, 19)
-    states = Steps(rod, 30.0, 1e-5, 2.0).at(np.linspace(0.7, 0.9, 4001))
+    states = Steps(rod, 30.0, 1e-5, 6, 2.0).at(np.linspace(0.7, 0.9, 4001))
     seen: list[float] = []
     with pytest.raises(SimulationError, match="lost its heading"):
         seen.extend(np.abs(rod.slopes(z)).min() for z in states)
