@@ -23,8 +23,9 @@ PROBES = 101  # frames that runs are compared at during the search, at most
 SAFETY = 2.0  # steps are not yet small when errors are large: found by experiment
 STALL = 0.7  # a change that falls by less than this has stalled
 GROWTH = 1.5, 4.0  # of the number of steps from run to run
-ENDED = 0.01  # |r'| of a disc a step before it loses its heading: the motion ends there; where it is larger, the step is too long
-ATTEMPTS = 20
+ENDED = 0.01  # |r'| of a disc a step before it loses its heading; where it is larger, the step is too long
+ATTEMPTS, FAILURES = 20, 12  # runs, and those of them that may stop early
+SWEPT = 10.0  # what sweeps leave, in units of their tolerance
 ROUNDED = 1e-12  # largest value of what is rounding only, in units of its scale
 
 RATES = ("omega", "phi_rate", "x_rate", "y_rate")
@@ -61,6 +62,11 @@ def _swept(tol: float) -> float:
     return max(1e-3 * tol, 1e-13)
 
 
+def tolerance_of(integrator: Integrator) -> float:
+    """The tolerance of its sweeps, 0 for an explicit one."""
+    return float(getattr(getattr(integrator, "base", integrator), "tolerance", 0.0))
+
+
 def to_tolerance(
     problem: Problem,
     method: str | Integrator,
@@ -73,9 +79,10 @@ def to_tolerance(
 
     Errors of two runs, steps h and h/r, are taken to be as 1 to r^-2 even for methods of higher order, whose order stiff modes
     reduce: the error of the finer is then the change over r^2 - 1; twice that is the estimate. Velocities, slopes and forces may
-    carry waves that no step resolves yet and whose errors do not fall at all: their estimate is the whole change, if that is
-    larger. The energy is known: its error is what it changed by.
+    carry waves that no step resolves yet and whose errors do not fall at all: their estimate is twice the change. What sweeps
+    leave, some times their tolerance, is added. The energy is known: its error is what it changed by.
 
+    A motion ends where a disc loses its heading: told by its |r'| a step before, and by runs of two steps that lose it at one time.
     "auto" goes on with a method of higher order where the change stalls, twice in a row. The search fails where the change of two
     runs is that of two runs that start one unit in the last place apart: then it is rounding, amplified by the motion.
 
@@ -105,7 +112,7 @@ def to_tolerance(
         start = run(problem, integrator, problem.duration / FEWEST, times)
         return _told(start, dict.fromkeys(_compared(start), 0.0), tol, 1)
     some = some_of(times)
-    steps, stalled, stalls, worst = _fewest(problem, integrator, times[-1]), 0, 0, np.inf
+    steps, stalled, stalls, failures, worst = _fewest(problem, integrator, times[-1]), 0, 0, 0, np.inf
     last: Solution | None = None
     failure: SimulationError | None = None
     for attempt in range(1, ATTEMPTS + 1):
@@ -114,18 +121,20 @@ def to_tolerance(
             found = run(problem, integrator, dt, some)
             failure = None
         except SimulationError as error:
-            if error.slope < ENDED:
+            if failure and error.slope < ENDED and abs(error.time - failure.time) < 3 * dt:  # the last dt was twice that
                 raise
-            failure = error
+            failure, failures = error, failures + 1
+            if failures == FAILURES:
+                raise
         if failure or found.stats["unconverged"]:
             steps, last = 2 * steps, None
             continue
         if last is not None:
-            errors = estimates(found, last)
+            errors = estimates(found, last, tolerance_of(integrator))
             before, worst = worst, _worst(found, errors, bound)
             if worst <= 1 and some.size < times.size:
                 last, found = (run(problem, integrator, h, times) for h in (last.stats["dt"], dt))
-                errors = estimates(found, last)
+                errors = estimates(found, last, tolerance_of(integrator))
                 worst = _worst(found, errors, bound)
             if worst <= 1:
                 return _told(found, errors, tol, attempt)
@@ -173,12 +182,18 @@ class NotReached(SimulationError):
         return type(self), self._given
 
 
-def estimates(found: Solution, last: Solution) -> dict[str, float]:
-    """Errors of a run, largest over discs and frames, from one with longer steps; see `to_tolerance`."""
-    factor = SAFETY / ((last.stats["dt"] / found.stats["dt"]) ** 2 - 1)
-    change = _differences(found, last)
-    errors = {name: value * (max(factor, 1.0) if name in DERIVED else factor) for name, value in change.items()}
+def estimates(found: Solution, last: Solution, swept: float) -> dict[str, float]:
+    """Errors of a run, largest over discs and frames, from one with longer steps; `swept`: the sweeps' tolerance."""
     assert found.problem is not None
+    system, dt = found.problem.system, found.stats["dt"]
+    length = float(system.scale[0])
+    left = dict(zip(system.rows, system.scale.tolist(), strict=True))
+    left |= {"omega": 1 / dt, "phi_rate": 1 / dt, "x_rate": length / dt, "y_rate": length / dt}
+    factor = SAFETY / ((last.stats["dt"] / dt) ** 2 - 1)
+    errors = {
+        name: value * (max(factor, SAFETY) if name in DERIVED else factor) + SWEPT * swept * left.get(name, 0.0)
+        for name, value in _differences(found, last).items()
+    }
     return errors | {"energy": float(np.abs(found.energy - found.problem.energy()).max())}
 
 
