@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +21,14 @@ LEAST = 1e-12  # the least tolerance: some thousand times the rounding of a posi
 LOOSE = 3e-4  # from here on "auto" begins with the midpoint method
 FEWEST = 20  # steps to begin with
 PROBES = 101  # frames that runs are compared at during the search, at most
+ORDERS = (2.0, 1.75, 1.5, 1.25, 1.0, 0.75, 0.5)  # of errors, as they are seen
 SAFETY = 2.0  # steps are not yet small when errors are large: found by experiment
-STALL = 0.7  # a change that falls by less than this has stalled
-GROWTH = 1.5, 4.0  # of the number of steps from run to run
+SURE = 1.5  # no error is estimated below so many times the change
+STALL = 0.5  # order seen from run to run: at it or below the error has stalled
+GROWTH = 1.5, 3.0  # of the number of steps from run to run
 ENDED = 0.01  # |r'| of a disc a step before it loses its heading; where it is larger, the step is too long
 ATTEMPTS, FAILURES = 20, 12  # runs, and those of them that may stop early
+SHARED = 100  # steps that may each leave what the sweeps' tolerance says
 SWEPT = 10.0  # what sweeps leave, in units of their tolerance
 ROUNDED = 1e-12  # largest value of what is rounding only, in units of its scale
 
@@ -62,6 +66,15 @@ def _swept(tol: float) -> float:
     return max(1e-3 * tol, 1e-13)
 
 
+def sharpened(integrator: Integrator, steps: int) -> Any:
+    """The integrator with its sweeps' tolerance shared out among steps beyond SHARED: what sweeps leave adds up."""
+    if isinstance(integrator, Composition):
+        return replace(integrator, base=sharpened(integrator.base, steps))
+    if isinstance(integrator, Midpoint | Gauss) and integrator.tolerance > 0:
+        return replace(integrator, tolerance=min(integrator.tolerance, max(integrator.tolerance * SHARED / steps, 1e-13)))
+    return integrator
+
+
 def tolerance_of(integrator: Integrator) -> float:
     """The tolerance of its sweeps, 0 for an explicit one."""
     return float(getattr(getattr(integrator, "base", integrator), "tolerance", 0.0))
@@ -77,10 +90,10 @@ def to_tolerance(
 ) -> Solution:
     """Run with smaller and smaller steps until the last change says that the tolerance is kept.
 
-    Errors of two runs, steps h and h/r, are taken to be as 1 to r^-2 even for methods of higher order, whose order stiff modes
-    reduce: the error of the finer is then the change over r^2 - 1; twice that is the estimate. Velocities, slopes and forces may
-    carry waves that no step resolves yet and whose errors do not fall at all: their estimate is twice the change. What sweeps
-    leave, some times their tolerance, is added. The energy is known: its error is what it changed by.
+    Errors of two runs, steps h and h/r, are taken to be as 1 to r^-p: the error of the finer is then the change over r^p - 1; twice
+    that, and no less than 1.5 times the change, is the estimate. The order p is what the last three runs show, at most 2 (stiff
+    modes reduce that of higher methods), and little where waves that no step resolves yet are in what changes; it is 1 after two
+    runs. What sweeps leave, some times their tolerance, is added. The energy is known: its error is what it changed by.
 
     A motion ends where a disc loses its heading: told by its |r'| a step before, and by runs of two steps that lose it at one time.
     "auto" goes on with a method of higher order where the change stalls, twice in a row. The search fails where the change of two
@@ -112,13 +125,14 @@ def to_tolerance(
         start = run(problem, integrator, problem.duration / FEWEST, times)
         return _told(start, dict.fromkeys(_compared(start), 0.0), tol, 1)
     some = some_of(times)
-    steps, stalled, stalls, failures, worst = _fewest(problem, integrator, times[-1]), 0, 0, 0, np.inf
+    steps, level, stalls, failures, worst = _fewest(problem, integrator, times[-1]), 0, 0, 0, np.inf
     last: Solution | None = None
+    change: Change | None = None
     failure: SimulationError | None = None
     for attempt in range(1, ATTEMPTS + 1):
-        dt = times[-1] / steps
+        dt, sharp = times[-1] / steps, sharpened(integrator, steps)
         try:
-            found = run(problem, integrator, dt, some)
+            found = run(problem, sharp, dt, some)
             failure = None
         except SimulationError as error:
             if failure and error.slope < ENDED and abs(error.time - failure.time) < 3 * dt:  # the last dt was twice that
@@ -127,30 +141,32 @@ def to_tolerance(
             if failures == FAILURES:
                 raise
         if failure or found.stats["unconverged"]:
-            steps, last = 2 * steps, None
+            steps, last, change = 2 * steps, None, None
             continue
         if last is not None:
-            errors = estimates(found, last, tolerance_of(integrator))
-            before, worst = worst, _worst(found, errors, bound)
+            earlier, change = change, Change(last, found)
+            errors = estimates(found, change, earlier, tolerance_of(sharp))
+            worst = _worst(found, errors, bound)
             if worst <= 1 and some.size < times.size:
-                last, found = (run(problem, integrator, h, times) for h in (last.stats["dt"], dt))
-                errors = estimates(found, last, tolerance_of(integrator))
+                last, found = (run(problem, sharp, h, times) for h in (last.stats["dt"], dt))
+                errors = estimates(found, Change(last, found), earlier, tolerance_of(sharp))
                 worst = _worst(found, errors, bound)
             if worst <= 1:
                 return _told(found, errors, tol, attempt)
-            stalls = stalls + 1 if worst > STALL * before else 0
+            stalled = earlier is not None and min(change.order(name, earlier) for name in bound) <= STALL
+            stalls = stalls + 1 if stalled else 0
             if stalls >= 2:
-                if method == "auto" and method_for(method, sharpest, stalled + 1) != integrator:
-                    stalled, stalls, worst, last = stalled + 1, 0, np.inf, None
-                    integrator = method_for(method, sharpest, stalled)
+                if method == "auto" and method_for(method, sharpest, level + 1) != integrator:
+                    level, stalls, worst, last, change = level + 1, 0, np.inf, None, None
+                    integrator, steps = method_for(method, sharpest, level), max(FEWEST, steps // 4)
                     continue
-                floor = _worst(found, _differences(found, run(_nudged(problem), integrator, dt, found.t)), bound)
+                floor = _worst(found, _differences(found, run(_nudged(problem), sharp, dt, found.t)), bound)
                 if floor > worst / 10:
                     raise NotReached(_tight(bound), worst, dt, floor, _told(found, errors, tol, attempt))
         last = found
         growth = 2.0 if not np.isfinite(worst) else float(np.clip(1.1 * worst**0.4, *GROWTH))
         steps = int(np.ceil(growth * steps))
-    if last is None:
+    if last is None or change is None:
         raise failure or SimulationError(f"steps do not converge, down to dt = {dt:g}; take another method", 0, 0.0, 0)
     raise NotReached(_tight(bound), worst, dt, None, _told(found, errors, tol, ATTEMPTS))
 
@@ -182,17 +198,33 @@ class NotReached(SimulationError):
         return type(self), self._given
 
 
-def estimates(found: Solution, last: Solution, swept: float) -> dict[str, float]:
-    """Errors of a run, largest over discs and frames, from one with longer steps; `swept`: the sweeps' tolerance."""
+class Change:
+    """What changed from a run to one with shorter steps: `ratio` of the steps, largest differences `of` each quantity."""
+
+    def __init__(self, last: Solution, found: Solution) -> None:
+        self.ratio, self.of = last.stats["dt"] / found.stats["dt"], _differences(found, last)
+
+    def order(self, name: str, earlier: "Change | None") -> float:
+        """The order of a quantity's error, from this change and an earlier one, of the steps before: of ORDERS; 1 if not known.
+
+        Errors C h^p change by C h^p (r^p - 1) from steps h r to h, so changes are as r^p (s^p - 1) to r^p - 1, s the ratio before.
+        """
+        if earlier is None:
+            return 1.0
+        r, s, now, then = self.ratio, earlier.ratio, self.of[name], earlier.of[name]
+        return next((p for p in ORDERS if then * (r**p - 1) >= now * r**p * (s**p - 1)), ORDERS[-1])
+
+
+def estimates(found: Solution, change: Change, earlier: Change | None, swept: float) -> dict[str, float]:
+    """Errors of a run, largest over discs and frames; see `to_tolerance`. swept : the sweeps' tolerance."""
     assert found.problem is not None
     system, dt = found.problem.system, found.stats["dt"]
     length = float(system.scale[0])
     left = dict(zip(system.rows, system.scale.tolist(), strict=True))
     left |= {"omega": 1 / dt, "phi_rate": 1 / dt, "x_rate": length / dt, "y_rate": length / dt}
-    factor = SAFETY / ((last.stats["dt"] / dt) ** 2 - 1)
     errors = {
-        name: value * (max(factor, SAFETY) if name in DERIVED else factor) + SWEPT * swept * left.get(name, 0.0)
-        for name, value in _differences(found, last).items()
+        name: value * max(SURE, SAFETY / (change.ratio ** change.order(name, earlier) - 1)) + SWEPT * swept * left.get(name, 0.0)
+        for name, value in change.of.items()
     }
     return errors | {"energy": float(np.abs(found.energy - found.problem.energy()).max())}
 

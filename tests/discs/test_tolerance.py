@@ -1,12 +1,19 @@
 """Runs to a tolerance: the true error is within it, and both choices are told."""
 
+import pickle
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from compare import lump
-from continuum import breathing_ring, steered_rod, untwisting_rod
+from compare.hard_problems import rough
+from continuum import breathing_ring, rolling_rod, steered_rod, untwisting_rod
 from discs import Gauss6, Gauss8, SimulationError, checks, simulate
-from tests.conftest import Model, models, uneven
+from discs.integrators import DOP853
+from discs.tolerance import ATTEMPTS, to_tolerance
+from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
 
 def true_error(problem, run):
@@ -84,3 +91,117 @@ def test_long_runs_find_their_step():
     for name in ("x", "y", "theta"):
         exact = getattr(truth, name)
         assert np.abs(getattr(run, name) - exact).max() <= 1e-3 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize(
+    ("heading_inertia", "stiffness", "n"), [(0.05, 10.0, 65), (0.02, 5.0, 65), (0.25, 75.0, 33), (0.05, 25.0, 33)]
+)
+def test_own_headings_that_swing_fast_are_followed(heading_inertia, stiffness, n):
+    """Fast swings of little size: the error stalls until steps resolve them; the search must neither give up nor be content."""
+    problem = lump(steered_rod(stiffness, stiffness, heading_inertia), n)
+    run = simulate(problem, "auto", tol=1e-3, frames=11, progress=False)
+    assert true_error(problem, run) <= 1e-3
+
+
+def test_a_method_that_stalls_is_followed_by_one_of_higher_order():
+    """White noise on every disc: the midpoint rule converges only once it resolves the shortest wave."""
+    problem = rough(65, 4.5)
+    run = simulate(problem, "auto", tol=1e-3, frames=5, progress=False)
+    assert run.stats["method"] == "gauss6"
+    assert run.stats["steps"] < 20_000
+    assert true_error(problem, run) <= 1e-3
+
+
+def test_rounding_is_shown_where_it_is_the_limit():
+    """Rolling sideways all waves grow: a unit in the last place is far more than 1e-11 at the end."""
+    problem = lump(rolling_rod(omega=3.0, amplitude=0.01, duration=6.0), 9)
+    words = r"tol = 1e-11 was not reached: .* one unit in the last place apart differ by .*, so rounding is what is left"
+    with pytest.raises(SimulationError, match=words) as caught:
+        simulate(problem, "auto", tol=1e-11, frames=3, progress=False)
+    assert caught.value.best.stats["attempts"] < ATTEMPTS
+    assert pickle.loads(pickle.dumps(caught.value)).message == caught.value.message
+
+
+def test_without_any_setting_a_run_is_to_a_thousandth():
+    problem = lump(untwisting_rod(twist=2.0), 33, "consistent")
+    run = simulate(problem, progress=False)
+    assert run.stats["tol"] == 1e-3
+    assert run.stats["unconverged"] == 0
+    assert true_error(problem, run) <= 1e-3
+    assert simulate(problem, dt=0.01, frames=1, progress=False).stats["method"] == "midpoint"
+    assert simulate(problem, frames=[0.0], progress=False).theta[0].tolist() == np.asarray(problem.initial.theta).tolist()
+
+
+def test_where_a_thousandth_is_out_of_reach_that_is_a_warning(monkeypatch):
+    monkeypatch.setattr("discs.tolerance.ATTEMPTS", 4)
+    problem = lump(untwisting_rod(twist=2.0), 33, "consistent")
+    with pytest.warns(UserWarning, match=r"tol = 0.001 was not reached: the error is estimated at .*: this is the last run"):
+        run = simulate(problem, progress=False)
+    assert run.error_estimate["theta"] > 1e-3
+    with pytest.raises(SimulationError, match=r"tol = 0.001 was not reached"):
+        simulate(problem, tol=1e-3, progress=False)
+
+
+@pytest.mark.parametrize("tol", [{"omega": 1e-4}, {"contact_force": 1e-3, "y": 1e-4}, {"phi_rate": 1e-3}])
+def test_tolerances_bind_what_they_name(tol):
+    problem = lump(steered_rod(), 17) if "phi_rate" in tol else lump(untwisting_rod(), 33, "consistent")
+    run = simulate(problem, tol=tol, frames=12, want=("contact_force",), progress=False)
+    exact = simulate(problem, "gauss8", run.stats["dt"] / 8, run.t, want=("contact_force",), progress=False)
+    for name, bound in tol.items():
+        there = getattr(exact, name)
+        assert np.abs(getattr(run, name) - there).max() <= bound * np.abs(there).max()
+    with pytest.raises(ValueError, match=r"tol must be one of 'x', .*'omega'.*; got 'contact_force'"):
+        simulate(problem, tol={"contact_force": 1e-3}, progress=False)
+
+
+def test_an_estimate_covers_every_frame():
+    """The error peaks in a few of 2001 frames: the estimate is of all, whatever the search looked at."""
+    problem = lump(untwisting_rod(), 17)
+    run = simulate(problem, tol=1e-4, frames=2001, progress=False)
+    exact = simulate(problem, "gauss8", 0.01, run.t, progress=False)
+    for name in ("x", "y", "theta", "omega"):
+        assert np.abs(getattr(run, name) - getattr(exact, name)).max() <= run.error_estimate[name]
+
+
+def test_runs_with_steps_that_did_not_converge_are_never_taken():
+    """Fifty sweeps are not enough at first; with steps so few the runs would agree by what they have in common."""
+    problem = lump(untwisting_rod(twist=2.0), 65, "consistent")
+    seen = []
+
+    def run(problem, integrator, dt, times):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            seen.append(simulate(problem, integrator, dt, times, progress=False))
+        return replace(seen[-1], x=0 * seen[-1].x, y=0 * seen[-1].y, theta=0 * seen[-1].theta)  # all agree
+
+    found = to_tolerance(problem, "midpoint", 1e-3, np.linspace(0.0, 4.5, 3), run)
+    assert seen[0].stats["unconverged"] > 0
+    assert found.stats["unconverged"] == 0
+    assert not any(made.stats["unconverged"] for made in seen[-2:])
+
+
+def problem_of(seed):
+    """A chain of any kind with a bent, twisted, rolling start, and a tolerance."""
+    rng = np.random.default_rng(seed)
+    model = (*SLAVED, *TRUE, *STEERED, *STEERED, *STEERED)[seed % 17]
+    n = int(np.exp(rng.uniform(np.log(5), np.log(12 if model.law == "true" else 60))))
+    problem = uneven(n, model, seed, equal=model.ends == "consistent")
+    duration = 0.3 if model == Model("ring", "unit") else np.exp(rng.uniform(np.log(0.5), np.log(3.0)))  # before it collapses
+    return replace(problem, duration=float(duration)), float(10 ** -rng.uniform(2, 4 if model.law == "true" else 8))
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_random_problems_are_within_their_tolerance(seed):
+    """No failure, no error above the tolerance; the reference is of another kind, or of steps eight times shorter."""
+    problem, tol = problem_of(seed)
+    run = simulate(problem, "auto", tol=tol, frames=4, progress=False)
+    small = problem.chain.n <= 12 and problem.system.kernel is not None
+    if small:
+        exact = simulate(problem, DOP853(rtol=1e-11, atol=1e-13), problem.duration, run.t, progress=False)
+    else:
+        exact = simulate(problem, Gauss8(tolerance=1e-13), run.stats["dt"] / 8, run.t, progress=False)
+    for row in problem.system.rows:
+        there = getattr(exact, row)
+        error = np.abs(getattr(run, row) - there).max()
+        assert error <= tol * np.abs(there).max()
+        assert error <= run.error_estimate[row]
