@@ -17,7 +17,8 @@ from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
 
 def true_error(problem, run):
-    exact = simulate(problem, Gauss8(tolerance=1e-14), problem.duration / 500, run.t, progress=False)
+    dt = min(problem.duration / 500, run.stats["dt"] / (2 if run.stats["method"] == "midpoint" else 8))
+    exact = simulate(problem, Gauss8(tolerance=1e-14), dt, run.t, progress=False)
     rows = [(getattr(run, row), getattr(exact, row)) for row in problem.system.rows]
     return max(np.abs(a - b).max() / np.abs(b).max() for a, b in rows)
 
@@ -114,10 +115,10 @@ def test_a_method_that_stalls_is_followed_by_one_of_higher_order():
 
 def test_rounding_is_shown_where_it_is_the_limit():
     """Rolling sideways all waves grow: a unit in the last place is far more than 1e-11 at the end."""
-    problem = lump(rolling_rod(omega=3.0, amplitude=0.01, duration=6.0), 9)
+    problem = lump(rolling_rod(omega=3.0, amplitude=0.01, duration=6.0), 33)
     words = r"tol = 1e-11 was not reached: .* one unit in the last place apart differ by .*, so rounding is what is left"
     with pytest.raises(SimulationError, match=words) as caught:
-        simulate(problem, "auto", tol=1e-11, frames=3, progress=False)
+        simulate(problem, "gauss8", tol=1e-11, frames=3, progress=False)
     assert caught.value.best.stats["attempts"] < ATTEMPTS
     assert pickle.loads(pickle.dumps(caught.value)).message == caught.value.message
 
