@@ -24,6 +24,8 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     n : nodes, both ends counted, or all around a ring.
     ends : "consistent" (second order), "springs" (first order) or "paper" (the paper's, first order).
     """
+    if not isinstance(scene, Scene):
+        raise ValueError(f"a Scene is wanted, as untwisting_rod() makes; got {type(scene).__name__}")
     checks.choice("ends", ends, stencils.ENDS)
     if ends == "ring" and not scene.closed:
         raise ValueError("ends='ring' needs a closed scene; this one has two free ends: take 'springs' or 'consistent'")

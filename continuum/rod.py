@@ -141,11 +141,16 @@ class Scene:
         if shift.any() and not self.closed:
             raise ValueError(f"shift belongs to a closed rod; got shift={self.shift} with closed=False")
         object.__setattr__(self, "shift", tuple(np.asarray(shift).tolist()))
+        if self.turns and not (self.closed and self.steered):
+            raise ValueError(f"turns belong to a closed rod with headings of its own; got turns={self.turns} of another")
 
     def fields(self, s: NDArray) -> dict[str, NDArray]:
         """The initial fields at places s (n,) by name, each (n,); ValueError if `initial` returns other than it should."""
         names = ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if self.steered else 4]
-        values = self.initial(s)
+        places = s.copy()
+        values = self.initial(places)
+        if not np.array_equal(places, s):
+            raise ValueError("the scene's initial function must not change the places that it is given; compute with a copy")
         if not isinstance(values, tuple) or len(values) != len(names):
             given = f"{len(values)} of them" if isinstance(values, tuple) else type(values).__name__
             raise ValueError(f"the scene's initial fields must be the tuple {', '.join(names)}; got {given}")

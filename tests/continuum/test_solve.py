@@ -247,6 +247,7 @@ def test_bad_scenes_are_refused():
         semidiscretise(untwisting_rod(), 9, "ring")
     for change, message in [
         ({"closed": "no"}, "closed must be True or False; got 'no'"),
+        ({"turns": 1}, "turns belong to a closed rod with headings of its own; got turns=1"),
         ({"initial": None}, "a scene needs a Rod and a function of s"),
         ({"rod": {}}, "a scene needs a Rod and a function of s"),
     ]:
@@ -254,6 +255,10 @@ def test_bad_scenes_are_refused():
             Scene(**{"rod": rod, "initial": initial, "duration": 1.0} | change)
     with pytest.raises(ValueError, match="initial fields must be the tuple x, y, theta, omega; got 3 of them"):
         semidiscretise(Scene(rod=rod, initial=lambda s: (s, s, s), duration=1.0), 9, "springs")
+    with pytest.raises(ValueError, match="must not change the places"):
+        solve(Scene(rod=rod, initial=lambda s: (s, 0 * s, s.__imul__(0), 0 * s), duration=1.0))
+    with pytest.raises(ValueError, match=r"a Scene is wanted, .*; got Rod"):
+        semidiscretise(rod, 9, "springs")
     bad = Scene(rod=rod, initial=lambda s: (s, s, s / 0.0, s), duration=1.0)
     with pytest.raises(ValueError, match="initial theta must be finite"), np.errstate(all="ignore"):
         semidiscretise(bad, 9, "springs")

@@ -279,3 +279,6 @@ def test_steps_of_elements_are_bounded(monkeypatch):
     monkeypatch.setattr("continuum.elements.MOST_CALLS", 1200)
     with pytest.raises(ValueError, match=r"tol is not reached in 100 time steps of 1 elements.*larger tol or a shorter duration"):
         solve(steered_rod(duration=1e5), 1e-3, progress=False)
+    monkeypatch.undo()
+    with pytest.raises(ValueError, match=r"tol is not reached in 131072 time steps of 1 elements"):  # foretold by the first steps
+        solve(steered_rod(duration=1e9), 1e-3, progress=False)
