@@ -229,7 +229,7 @@ class Lattice:
         return np.concatenate([*levels, checks.field("multipliers", multipliers, self.n_multipliers)])
 
     def _level(self, name: str, given: ArrayLike) -> NDArray:
-        level, shape = np.asarray(given, dtype=float), (len(self.theory.fields), self.nodes)
+        level, shape = checks.array(name, given), (len(self.theory.fields), self.nodes)
         if level.shape != shape or not np.isfinite(level).all():
             raise ValueError(f"{name} must be finite and of shape {shape}, fields and nodes; got shape {level.shape}")
         return level

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
 from discs.mechanics import MechanicalSystem
-from discs.textbook import Textbook, positive
+from discs.textbook import Textbook, finite, positive
 
 
 def contact_oscillator(
@@ -38,6 +38,7 @@ def contact_oscillator(
     Source: R. McLachlan, M. Perlmutter, J. Nonlinear Sci. 16 (2006) 283-328; Modin and Verdier (2020).
     """
     positive(mass=mass, stiffness=stiffness, driver_mass=driver_mass, driver_stiffness=driver_stiffness, width=width)
+    finite(speed=speed, drift=drift)
     return _driven(
         ("x", "y", "z"),
         (mass, stiffness, driver_mass),
@@ -63,6 +64,7 @@ def driven_oscillator(
     Raises ValueError unless the driver goes round.
     """
     positive(mass=mass, stiffness=stiffness, driver_mass=driver_mass, wave=wave)
+    finite(skew=skew, speed=speed, drift=drift)
 
     def hill(y: NDArray) -> NDArray:
         return wave * (np.cos(y) + 0.5 * skew * np.sin(2 * y))

@@ -1,6 +1,6 @@
 """What is to be computed: a chain, where it starts, and for how long."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -35,10 +35,10 @@ class State:
     phi_rate: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
-        n = max(np.size(v) for v in (self.x, self.y, self.theta, self.omega) if v is not None)
-        for name in ("x", "y", "theta", "omega", "phi", "phi_rate"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, checks.field(f"initial {name}", getattr(self, name), n))
+        given = {f.name: checks.array(f"initial {f.name}", v) for f in fields(self) if (v := getattr(self, f.name)) is not None}
+        n = max(value.size for value in given.values())
+        for name, value in given.items():
+            object.__setattr__(self, name, checks.field(f"initial {name}", value, n))
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,6 +94,12 @@ def positive(**values: float) -> None:
         checks.number(name, value, positive=True)
 
 
+def finite(**values: float) -> None:
+    """Refuse parameters that are not finite numbers, by name."""
+    for name, value in values.items():
+        checks.number(name, value)
+
+
 def _slope_drift(b: float, c: float, phi: float, start: float) -> tuple[float, float]:
     """Integrals of (b + c sin phi) cos phi and (b + c sin phi) sin phi from `start` to phi."""
     along = b * (np.sin(phi) - np.sin(start)) - 0.25 * c * (np.cos(2 * phi) - np.cos(2 * start))
@@ -127,6 +133,7 @@ def rolling_disc(
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.4. `turn_rate` must not be 0.
     """
     positive(mass=mass, spin_inertia=spin_inertia, heading_inertia=heading_inertia, radius=radius)
+    finite(roll_rate=roll_rate, heading=heading, slope=slope)
     turn = _nonzero("turn_rate", turn_rate, "the disc then rolls on a straight line")
     m, a, r, pull = mass, spin_inertia, radius, mass * slope
 
@@ -177,6 +184,7 @@ def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.6. `turn_rate` must not be 0.
     """
     positive(mass=mass, inertia=inertia)
+    finite(slope=slope, speed=speed, heading=heading)
     turn = _nonzero("turn_rate", turn_rate, "the blade then runs straight")
     pull = mass * slope
     system = MechanicalSystem.from_lagrangian(
@@ -218,6 +226,7 @@ def chaplygin_sleigh(
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.7. `offset` and `turn_rate` must not be 0.
     """
     positive(mass=mass, inertia=inertia)
+    finite(speed=speed, heading=heading)
     a = _nonzero("offset", offset, "a knife edge without slope")
     turn = _nonzero("turn_rate", turn_rate, "the sleigh then runs straight")
 
@@ -270,6 +279,8 @@ def nonholonomic_particle(mass: float, width: float, *, y: float, velocity: tupl
     Source: R. M. Rosenberg, Analytical Dynamics of Discrete Systems, 1977; Bloch, chapter 5. y. must not be 0.
     """
     positive(mass=mass, width=width)
+    finite(y=y)
+    velocity = tuple(checks.vector("velocity", velocity, 2).tolist())
     run = _nonzero("velocity[1]", velocity[1], "the particle then moves on a straight line")
     b = width
     system = MechanicalSystem.from_lagrangian(
