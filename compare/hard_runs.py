@@ -185,10 +185,10 @@ class Watched(reduced.Bound):
     one that so far was four times too slow at the beginning (a tenth of a second, or a thirtieth of its time), less later."""
 
     def __init__(self, problem: Problem, seconds: float) -> None:
-        from discs.kernels import methods
+        from discs.kernels import driver
 
         chain = problem.system.kernel
-        super().__init__(problem, lambda t, y, out: methods.reduced(chain, np.ascontiguousarray(y), out))
+        super().__init__(problem, lambda t, y, out: driver.reduced(chain, t, np.ascontiguousarray(y), out))
         self.duration, self.seconds, self.t, self.gave_up, self.begun = problem.duration, seconds, 0.0, "", processor()
 
     def watch(self, t: float) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from continuum.galerkin import Modes, SpectralRod
 from discs.integrators.gauss import tableau
-from discs.system import Phase, add
+from discs.skew import Phase, add
 
 
 def step(

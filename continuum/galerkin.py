@@ -38,7 +38,7 @@ from continuum.bases import polynomials, waves
 from continuum.density import Density
 from continuum.initial import Resolved, resolve
 from continuum.rod import Scene
-from discs.system import Phase, SkewGradient
+from discs.skew import Phase, SkewGradient
 
 DATA = 24  # points of a piece of the initial fields, besides those for the functions
 
@@ -208,7 +208,7 @@ class SpectralRod(SkewGradient):
     def forwards(self, frames: Frame, p: NDArray) -> NDArray:
         return self.forward(frames, p)
 
-    def forces(self, frames: Frame, shape: NDArray, moves: NDArray) -> NDArray:
+    def pulls(self, frames: Frame, shape: NDArray, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
         return self.back(frames, self.mean_force(shape + moves))
 
     def potential(self, shape: NDArray) -> float:
@@ -233,6 +233,6 @@ class SpectralRod(SkewGradient):
         values, vectors = np.linalg.eigh(c.t[:, None] * (bent + self.torsion) * c.t)
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 
-    def solve(self, secant: NDArray, c: Frame, g: complex, rhs: NDArray) -> NDArray:
+    def solve(self, secant: NDArray, c: Frame, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
         values, vectors, back = self.modes(c)
         return vectors @ ((back @ rhs) / (1 + g * values))

@@ -24,7 +24,7 @@ from continuum.galerkin import Modes, SpectralRod
 from discs import SimulationError
 from discs.integrators.gauss import tableau
 from discs.kernels.limits import LOST_HEADING
-from discs.system import Phase
+from discs.skew import Phase
 
 STAGES = ((7e-5, 4), (1.4e-6, 6), (1.4e-8, 8), (0.0, 12))  # from which tolerance of the fields on
 SWEEPS = 40

@@ -95,6 +95,8 @@ class Header(NamedTuple):
 def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """A problem as numbers and words, and arrays by the names of `PARAMETERS` of what differs from disc to disc."""
     chain, initial = problem.chain, problem.initial
+    if problem.loads:
+        raise ValueError("a run with loads cannot be written to a file: files do not hold loads")
     given = {f.name: getattr(chain, f.name) for f in fields(chain)}
     given |= {f"initial_{f.name}": getattr(initial, f.name) for f in fields(initial)}
     arrays = {name: value for name, value in given.items() if isinstance(value, np.ndarray)}

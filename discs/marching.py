@@ -9,7 +9,8 @@ import numpy as np
 from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import Cut, Frame
 from discs.problem import Problem
-from discs.system import Phase, Placed, RollingDiscs
+from discs.skew import Phase, Placed
+from discs.system import RollingDiscs
 from discs.trust import SUSPECTED, Watch, converging
 from discs.warn import warn
 
@@ -63,7 +64,7 @@ class March:
     Attributes
     ----------
     step : steps taken.
-    stuck : some states from which steps did not converge, and how many steps were taken from each.
+    stuck : some states from which steps did not converge, their times, and how many steps were taken from each.
     work : what they cost.
     memory : what the integrator remembers.
     """
@@ -72,7 +73,7 @@ class March:
         self, problem: Problem, integrator: Integrator, h: float, compiled: bool, quiet: bool, watch: Watch | None = None
     ) -> None:
         self.problem, self.integrator, self.h, self.watch = problem, integrator, h, watch
-        self.stuck: list[tuple[Any, int]] = []
+        self.stuck: list[tuple[Any, float, int]] = []
         self.system, self.work, self.step = problem.system, Work(), 0
         self.kernel = self.system.kernel if compiled else None
         self.twin = integrator if self.kernel is not None and isinstance(integrator, FixedStep) else None  # steps compiled
@@ -101,8 +102,8 @@ class March:
 
         with compiling(say, NOTICE):
             if self.twin is not None:
-                self.twin.march(self.kernel, self.memory, self.h, 0, self.bound)
-            self.observe(self.integrator.at(self.system, self.memory, 0.0, self.h, self.work, self.kernel))
+                self.twin.march(self.kernel, self.memory, 0.0, self.h, 0, self.bound)
+            self.observe(self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.kernel))
         _PREPARED.add(key)
 
     def keep(self) -> dict[str, Any]:
@@ -139,7 +140,7 @@ class March:
             try:
                 taken = self._plain() if self.twin is None else self._compiled(self.twin, most)
                 if due := watch is not None and watch.due == self.step:
-                    finer = self.integrator.finer(self.system, before, self.h, self.kernel)
+                    finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.kernel)
             except Cut:  # all of this turn is dropped
                 self.memory = before
                 vars(self.work).update(cost)
@@ -158,8 +159,8 @@ class March:
         if watch is None:
             return 0.0
         if rest and not watch.steps:
-            finer = integrator.finer(self.system, self.memory, rest, self.kernel)
-            one = integrator.at(self.system, self.memory, rest, self.h, Work(), self.kernel)
+            finer = integrator.finer(self.system, self.memory, self.step * self.h, rest, self.kernel)
+            one = integrator.at(self.system, self.memory, self.step * self.h, rest, self.h, Work(), self.kernel)
             watch.compare(one.hi, one.hi if finer is None else finer)
         found = watch.estimate()
         if watch.short and SUSPECTED[0] < found < SUSPECTED[1] and not self.stuck and isinstance(integrator, FixedStep):
@@ -171,7 +172,7 @@ class March:
     def _remember(self, before: Any, steps: int, stuck: int) -> None:
         """Keep a state from which steps did not converge, whenever their number has doubled: the first and the last three."""
         if not stuck or stuck.bit_length() < self.work.unconverged.bit_length():
-            self.stuck = [*self.stuck[:1], *self.stuck[1:][-2:], (before, steps)]
+            self.stuck = [*self.stuck[:1], *self.stuck[1:][-2:], (before, self.step * self.h, steps)]
 
     def remedy(self) -> dict[str, float]:
         """A step that converges where the run's did not, by the name that `stats` has for it; empty if it is not known."""
@@ -184,7 +185,7 @@ class March:
         """The discs a time 0 <= tau < h after the last step; `Cut` where Ctrl-C was heard and did not raise."""
         stuck = self.work.unconverged
         try:
-            frame = self.integrator.at(self.system, self.memory, tau, self.h, self.work, self.kernel)
+            frame = self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, self.work, self.kernel)
         except ArithmeticError as error:
             raise self._gave_up(error) from None
         if tau:
@@ -203,10 +204,10 @@ class March:
         if frame.seen is not None:
             q, energy, slip = frame.seen
         elif self.kernel is not None:
-            import discs.kernels.methods as methods
+            from discs.kernels import driver
 
             q = np.empty_like(frame.hi)
-            energy, slip = methods.observe(self.kernel, frame.hi, frame.lo, frame.rate, q)
+            energy, slip = driver.observe(self.kernel, frame.hi, frame.lo, frame.rate, q)
         else:
             shape = system.shape(frame.hi, frame.lo)
             q, energy = frame.hi + frame.lo, system.kinetic(frame.rate) + system.potential(shape)
@@ -219,7 +220,7 @@ class March:
     def _plain(self) -> int:
         previous, stuck = self.memory, self.work.unconverged
         try:
-            self.memory = self.integrator.advance(self.system, previous, self.h, self.work)
+            self.memory = self.integrator.advance(self.system, previous, self.step * self.h, self.h, self.work)
         except ArithmeticError as error:
             raise self._gave_up(error) from None
         # leapfrog remembers more than a state; its moves are its velocity
@@ -235,7 +236,7 @@ class March:
         """
         lost = self.system.lost_heading(before, after)
         if lost is None and by_velocity and self.system.vanishing:
-            start = self.integrator.at(self.system, before, 0.0, self.h, self.work)
+            start = self.integrator.at(self.system, before, self.step * self.h, 0.0, self.h, self.work)
             lost = self.system.lost_heading(before, start._replace(hi=start.hi + h * start.rate))
         return lost
 
@@ -244,10 +245,10 @@ class March:
 
     def _compiled(self, twin: FixedStep, steps: int) -> int:
         previous = self.memory
-        self.memory, tally = twin.march(self.kernel, previous, self.h, steps, self.bound)
+        self.memory, tally = twin.march(self.kernel, previous, self.step * self.h, self.h, steps, self.bound)
         self.work.add(tally)
         if tally.lost >= 0:
-            previous, _ = twin.march(self.kernel, previous, self.h, tally.steps - 1, self.bound)
+            previous, _ = twin.march(self.kernel, previous, self.step * self.h, self.h, tally.steps - 1, self.bound)
         self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
         return tally.steps
 
@@ -270,7 +271,7 @@ class March:
     def _check_energy(self, kinetic: float, frame: Frame | None, step: int, time: float) -> None:
         if kinetic <= self.bound:
             return
-        frame = frame or self.integrator.at(self.system, self.memory, 0.0, self.h, self.work, None)
+        frame = frame or self.integrator.at(self.system, self.memory, time, 0.0, self.h, self.work, None)
         speed = np.abs(frame.rate[2])
         disc = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
         if np.isfinite(self.integrator.stability_limit):

@@ -9,9 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
 from discs.chain import Chain, SteeredChain
+from discs.loads import total
+from discs.skew import Load, Phase
 from discs.slaved import SlavedSystem
 from discs.steered import SteeredSystem
-from discs.system import Phase, RollingDiscs
+from discs.system import RollingDiscs
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,8 @@ class Problem:
     chain : the discs and springs.
     initial : state at t = 0.
     duration : time to simulate, > 0.
+    loads : what acts besides the springs and the ground, see `discs.loads`; they add up. Energy is not conserved then, and runs are
+        not warned of it.
 
     Raises
     ------
@@ -60,6 +64,7 @@ class Problem:
     chain: Chain | SteeredChain
     initial: State
     duration: float
+    loads: tuple[Load, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
@@ -69,6 +74,7 @@ class Problem:
         if steered != (self.initial.phi is not None):
             need = "needs initial headings phi" if steered else "takes its headings from the line: leave phi out"
             raise ValueError(f"{type(self.chain).__name__} {need}")
+        self._check_loads()
         if isinstance(self.chain, Chain):
             self._check_slopes(self.chain)
         else:
@@ -76,7 +82,18 @@ class Problem:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Problems are sent to other processes as what they were made from."""
-        return Problem, (self.chain, self.initial, self.duration)
+        return Problem, (self.chain, self.initial, self.duration, self.loads)
+
+    def _check_loads(self) -> None:
+        if not isinstance(self.loads, tuple) or not all(isinstance(load, Load) for load in self.loads):
+            raise ValueError(f"loads must be a tuple of loads, as (Linear(...),); got {self.loads!r}")
+        shape = (3 if isinstance(self.chain, Chain) else 4), self.chain.n
+        for load in self.loads:
+            if np.shape(load.damping) != shape or np.shape(load.stiffness) != shape:
+                raise ValueError(
+                    f"{type(load).__name__}: damping and stiffness must have shape {shape}, a row for each coordinate and a column "
+                    f"for each disc; got {np.shape(load.damping)} and {np.shape(load.stiffness)}"
+                )
 
     def _check_slopes(self, chain: Chain) -> None:
         shape = self.system.shape(self._positions())
@@ -99,7 +116,8 @@ class Problem:
     @cached_property
     def system(self) -> RollingDiscs:
         """The equations of motion."""
-        return SteeredSystem(self.chain) if isinstance(self.chain, SteeredChain) else SlavedSystem(self.chain)
+        load = total(self.loads)
+        return SteeredSystem(self.chain, load) if isinstance(self.chain, SteeredChain) else SlavedSystem(self.chain, load)
 
     def _positions(self) -> NDArray:
         return np.array([getattr(self.initial, name) for name in self.system.rows])
@@ -116,10 +134,12 @@ class Problem:
 
     @cached_property
     def blown_up(self) -> float:
-        """Kinetic energy that no motion comes near: V >= 0 and H is constant, so it cannot exceed H; ten times that.
+        """Blow-up threshold: ten times the conserved energy, which kinetic energy cannot exceed as V >= 0; none with loads.
 
         Far below one unit of twist is rounding.
         """
+        if self.loads:
+            return np.inf
         chain = self.chain
         return 10 * self.energy() + 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
 
@@ -145,7 +165,7 @@ class Problem:
 
     def energy(self, state: State | None = None) -> float:
         """Kinetic and potential energy of a state, the initial one by default."""
-        return self._energy if state is None else Problem(self.chain, state, self.duration)._energy
+        return self._energy if state is None else Problem(self.chain, state, self.duration, self.loads)._energy
 
     @cached_property
     def _energy(self) -> float:

@@ -17,7 +17,6 @@ from discs.problem import Problem
 from discs.recording import Recording, Rows, kept_settings
 from discs.solution import Solution
 from discs.step import suggest_dt
-from discs.system import RollingDiscs
 from discs.tolerance import USUAL, NotReached, some_of, to_tolerance
 from discs.trust import Watch, cure, doubts
 from discs.warn import warn
@@ -164,7 +163,7 @@ def _run(
     checked : look at the error of the steps. more : what else `stats` tells. estimate : of the error, if it is known.
     """
     want = _wanted(want, integrator.offers)
-    compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None
+    compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None and integrator.compiles
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
@@ -174,6 +173,8 @@ def _run(
     if end / h > MOST_STEPS:
         raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")
     system = problem.system
+    if problem.loads and not integrator.takes_loads:
+        raise ValueError(f"{integrator.name!r} does not take loads; take a method that does, as 'midpoint'")
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
@@ -231,22 +232,24 @@ def _observed(march: March, tau: float, want: tuple[str, ...], offered: bool) ->
     frame = march.frame(tau)
     found = march.observe(frame)
     if want:
-        found |= _extras(march.system, frame, want)
+        found |= _extras(march, frame, march.step * march.h + tau, want)
     if offered:
         found |= march.integrator.extras(march.system, march.memory, march.h)
     return found
 
 
-def _extras(system: RollingDiscs, frame: Frame, want: tuple[str, ...]) -> dict[str, Any]:
+def _extras(march: March, frame: Frame, t: float, want: tuple[str, ...]) -> dict[str, Any]:
     """What a frame records only when asked to."""
-    shape, rate = system.shape(frame.hi, frame.lo), frame.rate
+    system, rate = march.system, frame.rate
+    shape = system.shape(frame.hi, frame.lo)
     found: dict[str, Any] = {}
     if "velocity" in want:
         found |= {"x_rate": rate[0], "y_rate": rate[1]}
     if "slope" in want:
         found |= dict(zip(("slope_x", "slope_y"), system.slope(shape), strict=True))
     if "contact_force" in want:
-        found["contact_force"] = system.contact_force(shape, rate)
+        f = 0.0 if system.load is None else system.load.force(t, frame.hi + frame.lo, rate)
+        found["contact_force"] = system.contact_force(shape, rate, f)
     return found
 
 

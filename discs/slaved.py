@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from discs import stencils
 from discs.chain import Chain
 from discs.kernels.limits import LOST_HEADING
+from discs.skew import Load, Placed
 from discs.springs import LinearCurvature, TrueCurvature
-from discs.system import Placed, RollingDiscs, folded
+from discs.system import RollingDiscs, folded
 
 
 class SlavedSystem(RollingDiscs):
@@ -31,9 +32,10 @@ class SlavedSystem(RollingDiscs):
 
     rows = ("x", "y", "theta")
 
-    def __init__(self, chain: Chain) -> None:
+    def __init__(self, chain: Chain, load: Load | None = None) -> None:
         n, ends = chain.n, chain.ends
         self.n, self._k, self._ends, self._chain = n, chain.k, ends, chain
+        self.load = load
         self.closed, self.reach = ends == "ring", 3 if ends == "consistent" else 2
         self.scale = np.array([chain.length, chain.length, 1.0])
         self._springs: Any = LinearCurvature(chain) if chain.curvature == "linear" else TrueCurvature(chain)
@@ -135,8 +137,9 @@ class SlavedSystem(RollingDiscs):
 
     @cached_property
     def kernel(self) -> Any:
-        if not self.quadratic:
+        if not self.quadratic or (self.load is not None and self.load.parameters is None):
             return None
         from discs.kernels import slaved  # numba is slow to import
 
-        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs)
+        load = None if self.load is None else self.load.parameters
+        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs, load)

@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 
 from discs import stencils
 from discs.chain import SteeredChain
-from discs.system import Assembly, Placed, RollingDiscs, folded
+from discs.skew import Load, Placed
+from discs.system import Assembly, RollingDiscs, folded
 
 
 class Links(NamedTuple):
@@ -63,8 +64,9 @@ class SteeredSystem(RollingDiscs):
     reach = 1
     vanishing = False
 
-    def __init__(self, chain: SteeredChain) -> None:
+    def __init__(self, chain: SteeredChain, load: Load | None = None) -> None:
         self.n, self._k, self._ends, self._chain = chain.n, chain.k, chain.ends, chain
+        self.load = load
         self.closed = chain.ends == "ring"
         self.scale = np.array([chain.length, chain.length, 1.0, 1.0])
         self._shift = np.array([*chain.shift, 0.0, 2 * np.pi * chain.turns])
@@ -200,6 +202,9 @@ class SteeredSystem(RollingDiscs):
 
     @cached_property
     def kernel(self) -> Any:
+        if self.load is not None and self.load.parameters is None:
+            return None
         from discs.kernels import steered  # numba is slow to import
 
-        return steered.parameters(self._chain, self.weights, self._roots, self.scale, self._shift, self._stiffness)
+        load = None if self.load is None else self.load.parameters
+        return steered.parameters(self._chain, self.weights, self._roots, self.scale, self._shift, self._stiffness, load)

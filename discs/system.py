@@ -1,129 +1,14 @@
-r"""What every chain of rolling discs is: a skew-gradient system q' = C(q) pi, pi' = -C(q)^T grad V(q).
+"""What every chain of rolling discs is; see `discs.skew` for the form of its equations."""
 
-The columns of C span the velocities that rolling allows, scaled so that C^T M C = 1 for the mass matrix M; pi are the rates along
-them. H = |pi|^2/2 + V(q) is constant because the two factors C are each other's transpose, and the constraint holds identically.
-`discs.slaved` and `discs.steered` are chains in this form; the derivations stand there. (`continuum.galerkin` is the field.)
-
-A configuration q is an array (rows, n), one row for each coordinate of a disc. All that forces need of it is its *shape*: the
-differences between neighbours, and headings where a disc has its own. Shapes are formed from both parts of the positions.
-
-Energy-exact steps need the mean force between two configurations, a discrete gradient D with D . (q_1 - q_0) = V(q_1) - V(q_0). V
-is half a sum of stiffness times strain squared; if the strains' changes are written as s_1 - s_0 = B (q_1 - q_0) with a
-secant matrix B, then D = B^T (stiffness) (s_0 + s_1)/2 is one.
-"""
-
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
-
-class Placed(Protocol):
-    """What has positions hi + lo, (rows, n)."""
-
-    @property
-    def hi(self) -> NDArray: ...
-
-    @property
-    def lo(self) -> NDArray: ...
-
-
-class Phase(NamedTuple):
-    """A point of phase space: positions as an unevaluated sum of two doubles, and momenta.
-
-    hi, lo : (rows, n); q = hi + lo with lo below half a unit in the last place of hi.
-    pi : (n,), or (2, n) with own headings, rates along the columns of C.
-    """
-
-    hi: NDArray
-    lo: NDArray
-    pi: NDArray
-
-
-def add(hi: NDArray, lo: NDArray, increment: NDArray) -> tuple[NDArray, NDArray]:
-    """Add an increment to hi + lo without losing its low digits (Knuth's two-sum)."""
-    term = increment + lo
-    total = hi + term
-    part = total - hi
-    return total, (hi - (total - part)) + (term - part)
-
-
-class SkewGradient(ABC):
-    """Equations q. = C(q) pi, pi. = -C(q)^T grad V(q): all that integrators need to know.
-
-    Attributes
-    ----------
-    n : number of discs, or of functions that a field is made of.
-    rows : names of the rows of q.
-    scale : (rows,), the size of a motion: a length, and a radian.
-    quadratic : whether V is quadratic, so that secants do not depend on the step.
-    """
-
-    n: int
-    rows: tuple[str, ...]
-    scale: NDArray
-    quadratic: bool
-
-    @abstractmethod
-    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Any:
-        """The shape of positions hi + lo: what C and V depend on."""
-
-    @abstractmethod
-    def moved(self, shape: Any, dq: NDArray) -> Any:
-        """The shape after a change dq (rows, n) of the positions."""
-
-    @abstractmethod
-    def frame(self, shape: Any) -> Any:
-        """C, as `forward`, `back` and `solve` take it."""
-
-    @abstractmethod
-    def forward(self, c: Any, p: NDArray) -> NDArray:
-        """C p, (rows, n)."""
-
-    @abstractmethod
-    def back(self, c: Any, g: NDArray) -> NDArray:
-        """C^T g, of the shape of pi."""
-
-    @abstractmethod
-    def potential(self, shape: Any) -> float:
-        """V."""
-
-    @abstractmethod
-    def secant(self, shape: Any, dq: NDArray) -> Any:
-        """What depends on a step dq (rows, n) from a shape: the mean geometry that `mean_force` and `solve` need."""
-
-    @abstractmethod
-    def mean_force(self, secant: Any) -> NDArray:
-        """The discrete gradient of V over the step, (rows, n); grad V if the step is zero."""
-
-    @abstractmethod
-    def solve(self, secant: Any, c: Any, g: complex, rhs: NDArray) -> NDArray:
-        """Solve (I + g C^T S C) p = rhs for p, of the shape of pi, S = B^T (stiffness) B."""
-
-    def gradient(self, shape: Any) -> NDArray:
-        """grad V, (rows, n)."""
-        return self.mean_force(self.secant(shape, self._no_step))
-
-    @cached_property
-    def _no_step(self) -> NDArray:
-        return np.zeros((len(self.rows), self.n))
-
-    # Several configurations, the stages of a step; here one after the other, a system may take them at once
-
-    def frames(self, shape: Any, moves: NDArray) -> Any:
-        """C after each of `moves` (stages, rows, n)."""
-        return [self.frame(self.moved(shape, move)) for move in moves]
-
-    def forwards(self, frames: Any, p: NDArray) -> NDArray:
-        """C p of each, (stages, rows, n)."""
-        return np.array([self.forward(c, stage) for c, stage in zip(frames, p, strict=True)])
-
-    def forces(self, frames: Any, shape: Any, moves: NDArray) -> NDArray:
-        """C^T grad V after each of `moves`, of the shape of p."""
-        return np.array([self.back(c, self.gradient(self.moved(shape, m))) for c, m in zip(frames, moves, strict=True)])
+from discs.skew import Placed, SkewGradient
 
 
 class RollingDiscs(SkewGradient):
@@ -181,13 +66,13 @@ class RollingDiscs(SkewGradient):
     def polarised(self, shape: Any, other: Any) -> float:
         """The symmetric bilinear form of which V is the square; ValueError unless V is quadratic."""
 
-    def contact_force(self, shape: Any, v: NDArray) -> NDArray:
-        """Force lambda of the ground on each disc, (2, n), for admissible rates v (rows, n).
+    def contact_force(self, shape: Any, v: NDArray, f: NDArray | float = 0.0) -> NDArray:
+        """Force lambda of the ground on each disc, (2, n), for admissible rates v (rows, n) and loads f (rows, n).
 
-        From rho w r.. = -dV/dr + lambda with r.. = e omega. + e. omega, and
-        w (alpha + rho |e|^2) omega. = -e . dV/dr - dV/dtheta - rho w omega e . e. .
+        With g = grad V - f, from rho w r.. = -g_r + lambda with r.. = e omega. + e. omega, and
+        w (alpha + rho |e|^2) omega. = -e . g_r - g_theta - rho w omega e . e. .
         """
-        gradient, mass, omega = self.gradient(shape), self.weights[0], v[2]
+        gradient, mass, omega = self.gradient(shape) - f, self.weights[0], v[2]
         e, turning = self.contact(shape), self.contact_rate(shape, v)
         inertia = self.weights[2] + mass * (e * e).sum(axis=0)
         torque = -(e * gradient[:2]).sum(axis=0) - gradient[2] - mass * omega * (e * turning).sum(axis=0)
@@ -209,12 +94,16 @@ class RollingDiscs(SkewGradient):
     def _inverse_order(self) -> NDArray | None:
         return None if self.order is None else np.argsort(self.order)
 
-    def solve(self, secant: Any, c: NDArray, g: complex, rhs: NDArray) -> NDArray:
+    def solve(self, secant: Any, c: NDArray, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
         """In O(n): for g > 0 by banded Cholesky, for a complex g by banded elimination. In double precision whatever that of
         `rhs`, which is enough for a correction: a state in `longdouble` is carried on in extended precision.
         """
         matrix = g * self.stiffness(secant, c)
         matrix[-1] += 1
+        if self.load is not None:
+            guide = self.back(c, (d * self.load.damping + g * self.load.stiffness) * c).ravel()
+            matrix = matrix.astype(np.result_type(matrix, guide))
+            matrix[-1] += guide if self.order is None else guide[self.order]
         rhs = rhs.astype(matrix.dtype)
         flat = rhs.ravel() if self.order is None else rhs.ravel()[self.order]
         if np.iscomplexobj(matrix):

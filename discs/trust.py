@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.integrators.base import FixedStep, Tally, Work
-from discs.system import Phase, RollingDiscs
+from discs.skew import Phase
+from discs.system import RollingDiscs
 
 EVERY = 50  # steps, of which one is compared
 MOST = 8  # steps compared in a run
@@ -65,7 +66,7 @@ class Watch:
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), kernel)
         steps = [int((i + 0.5) * self.apart) + 1 for i in range(len(self.places))]
         for step, place in zip([*steps, self.steps], [*self.places, last], strict=True):
-            memory, tally = advanced(system, integrator, memory, 0.5 * h, 2 * (step - done), kernel)
+            memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), kernel)
             if tally.lost >= 0 or not np.isfinite(memory.hi).all():
                 return None
             done, off = step, np.abs(memory.hi - place).max(axis=1)
@@ -83,25 +84,27 @@ class Watch:
         return SAFETY * (self.steps or 1) / self.count * worst
 
 
-def advanced(system: RollingDiscs, integrator: FixedStep, memory: Any, h: float, steps: int, kernel: Any) -> tuple[Any, Tally]:
+def advanced(
+    system: RollingDiscs, integrator: FixedStep, memory: Any, t: float, h: float, steps: int, kernel: Any
+) -> tuple[Any, Tally]:
     """What the integrator remembers some steps later, and what they cost."""
     if kernel is not None:
-        return integrator.march(kernel, memory, h, steps, np.inf)
+        return integrator.march(kernel, memory, t, h, steps, np.inf)
     work = Work()
     for _ in range(steps):
-        memory = integrator.advance(system, memory, h, work)
+        memory, t = integrator.advance(system, memory, t, h, work), t + h
     return memory, Tally(steps, work.gradients, work.solves, work.unconverged, -1)
 
 
-def converging(system: RollingDiscs, integrator: FixedStep, before: Any, steps: int, h: float, kernel: Any) -> float:
+def converging(system: RollingDiscs, integrator: FixedStep, before: Any, t: float, steps: int, h: float, kernel: Any) -> float:
     """A step with which the first of `steps` steps that does not converge, from a state, would; h/2^HALVINGS if none was found."""
     for _ in range(steps):
-        after, tally = advanced(system, integrator, before, h, 1, kernel)
+        after, tally = advanced(system, integrator, before, t, h, 1, kernel)
         if tally.unconverged:
             break
-        before = after
+        before, t = after, t + h
     for halving in range(1, HALVINGS + 1):
-        if not advanced(system, integrator, before, h / 2**halving, 2**halving, kernel)[1].unconverged:
+        if not advanced(system, integrator, before, t, h / 2**halving, 2**halving, kernel)[1].unconverged:
             break
     return h / 2**halving
 

@@ -10,7 +10,7 @@ from compare import lump
 from continuum import breathing_ring, steered_rod, untwisting_rod
 from discs import Midpoint, Problem, SimulationError, simulate
 from discs.integrators import Work
-from discs.system import Phase
+from discs.skew import Phase
 
 
 def spent(run: Callable[[], object], times: int) -> list[float]:

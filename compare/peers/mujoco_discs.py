@@ -174,15 +174,13 @@ def _build(problem: Problem, h: float, second_order: bool) -> tuple[Any, Any]:
 
 def _pull(problem: Problem) -> Callable[[NDArray, NDArray], None]:
     """-grad V of MuJoCo's coordinates, into an array of its forces, and headings that follow the line; compiled for one chain."""
-    import numba
-
-    from discs.kernels import chain as do
-    from discs.kernels.compiled import OPTIONS
+    from discs.kernels import protocol as do
+    from discs.kernels.compiled import jit
 
     chain, n, rows = problem.system.kernel, problem.chain.n, len(problem.system.rows)
     order = np.array(ORDER)
 
-    @numba.njit(**OPTIONS)
+    @jit
     def pull(position, force):  # type: ignore[no-untyped-def]
         work = do.workspace(chain)
         q, still, g, c = np.empty((rows, n)), np.zeros((rows, n)), np.empty((rows, n)), np.empty((rows, n))

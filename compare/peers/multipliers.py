@@ -66,16 +66,14 @@ def multiplier_peer(problem: Problem) -> Peer:
 
 def _residual(problem: Problem) -> Callable[[NDArray, NDArray, NDArray], None]:
     """The residual of the multiplier form, (y, y., out), compiled for one chain."""
-    import numba
-
-    from discs.kernels import chain as do
-    from discs.kernels.compiled import OPTIONS
+    from discs.kernels import protocol as do
+    from discs.kernels.compiled import jit
 
     system, chain = problem.system, problem.system.kernel
     rows, n = len(system.rows), system.n
     weights, width = np.array(system.weights), 2 * len(system.rows) + 2
 
-    @numba.njit(**OPTIONS)
+    @jit
     def residual(y, yp, out):  # type: ignore[no-untyped-def]
         work = do.workspace(chain)
         q, still, g, c = np.empty((rows, n)), np.zeros((rows, n)), np.empty((rows, n)), np.empty((rows, n))

@@ -25,17 +25,14 @@ def bound(problem: Problem) -> Callable[[float, NDArray, NDArray], None]:
             out[:] = plain(t, y)
 
         return in_numpy
-    import numba
+    from discs.kernels import driver
+    from discs.kernels.compiled import jit
 
-    from discs.kernels import methods
-    from discs.kernels.compiled import OPTIONS
+    chain, inner = problem.system.kernel, jit(driver.reduced.__wrapped__)  # type: ignore[attr-defined]
 
-    chain, reduced = problem.system.kernel, methods.reduced.py_func
-    inner = numba.njit(**OPTIONS)(reduced)
-
-    @numba.njit(**OPTIONS)
+    @jit
     def f(t, y, out):  # type: ignore[no-untyped-def]
-        inner(chain, y, out)
+        inner(chain, t, y, out)
 
     return f
 

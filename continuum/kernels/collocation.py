@@ -5,6 +5,7 @@ import numpy as np
 from continuum.kernels.spectral import blank, force, forward, frame, part, settle
 from discs.kernels.compiled import kernel
 from discs.kernels.shared import add
+from discs.skew import Phase
 
 
 @part
@@ -166,7 +167,8 @@ def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v):
                     moves[i, row, k] += v[i, row, k]
         if within(moves, 0.5 * h, scale):
             mixed(np.zeros((1, 3, n)), weights, v, h, v1)
-            add(hi, lo, v1[0], 1.0)
+            state = Phase(hi, lo, start[0])
+            add(state, v1[0], 1.0, state)
             for k in range(n):
                 before = pi[k]
                 for i in range(s):

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.system import Phase, RollingDiscs
+from discs.skew import Phase
+from discs.system import RollingDiscs
 
 
 @dataclass
@@ -47,18 +48,10 @@ class Cut(Exception):
     """A compiled call that Ctrl-C cut short; what it did is dropped, and the memory is that from before."""
 
 
-def tally(found: tuple[int, int, int, int, int]) -> Tally:
-    """What a kernel returned; of one that Ctrl-C ended, `Cut` if Python's handler of it does not raise KeyboardInterrupt itself."""
-    if found[0] < 0:
-        signal.raise_signal(signal.SIGINT)
-        raise Cut
-    return Tally(*found)
-
-
 class Frame(NamedTuple):
     """Positions q = hi + lo and their rates of change, all (rows, n).
 
-    lost : a disc that a compiled step on the way saw losing its heading, or -1; then the rest means nothing.
+    lost : a disc that a compiled step on the way saw losing its heading, or -1; then the rest is undefined.
     seen : q, energy and largest slip, where the compiled form found them on the way.
     """
 
@@ -80,6 +73,7 @@ class Integrator(ABC):
     reference : where it comes from.
     stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
     offers : names of extra quantities it can report per frame, see `extras`.
+    takes_loads : whether it computes what acts besides the springs.
     adaptive : whether it chooses its own steps; then h, in what follows, is the longest it may take.
     """
 
@@ -89,7 +83,13 @@ class Integrator(ABC):
     reference: ClassVar[str]
     stability_limit: ClassVar[float]
     offers: ClassVar[tuple[str, ...]] = ()
+    takes_loads: ClassVar[bool] = True
     adaptive: ClassVar[bool]
+
+    @property
+    @abstractmethod
+    def compiles(self) -> bool:
+        """Whether it has a compiled form, or takes the chain's in a form of its own; else it runs on the plain engine."""
 
     @abstractmethod
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Any:
@@ -99,12 +99,12 @@ class Integrator(ABC):
         """
 
     @abstractmethod
-    def advance(self, system: RollingDiscs, memory: Any, h: float, work: Work) -> Any:
-        """The memory one step h later."""
+    def advance(self, system: RollingDiscs, memory: Any, t: float, h: float, work: Work) -> Any:
+        """The memory one step h later than t."""
 
     @abstractmethod
-    def at(self, system: RollingDiscs, memory: Any, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
-        """The discs a time 0 <= tau < h after the last step (of size h); the trajectory is not touched."""
+    def at(self, system: RollingDiscs, memory: Any, t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+        """The discs a time 0 <= tau < h after the last step (of size h) to t; the trajectory is not touched."""
 
     @abstractmethod
     def kinetic(self, system: RollingDiscs, memory: Any, h: float) -> float:
@@ -118,7 +118,7 @@ class Integrator(ABC):
     def recall(self, memory: Any, kept: dict[str, Any]) -> Any:
         """The memory that was kept; `memory` is that of `begin`, of the same run."""
 
-    def finer(self, system: RollingDiscs, memory: Any, h: float, chain: Any = None) -> NDArray | None:
+    def finer(self, system: RollingDiscs, memory: Any, t: float, h: float, chain: Any = None) -> NDArray | None:
         """Positions (rows, n) one step h later, of an error several times smaller, for `discs.trust`; None: steps are checked as
         they are taken."""
         return None
@@ -129,68 +129,82 @@ class Integrator(ABC):
 
 
 class FixedStep(Integrator):
-    """A method of equal steps, which has a compiled twin."""
+    """A method of equal steps.
+
+    Attributes
+    ----------
+    parameters : what `discs.kernels.driver` is given for the compiled twin, a NamedTuple whose kind has a `step` filled in; None if
+        there is none, and runs then take the plain form.
+    """
 
     adaptive: ClassVar[bool] = False
 
-    @abstractmethod
-    def march(self, chain: Any, memory: Any, h: float, steps: int, bound: float) -> tuple[Any, Tally]:
-        """The compiled twin of `steps` times `advance`, for the parameters `system.kernel` of a chain.
+    @property
+    def parameters(self) -> Any:
+        return None
 
-        Stops after a step whose kinetic energy is not below `bound`, and in one in which a disc loses its heading; where the discs
-        are means nothing then. Raises `Cut` on Ctrl-C, in every sweep.
+    @final
+    @property
+    def compiles(self) -> bool:
+        return self.parameters is not None
+
+    @final
+    def march(self, chain: Any, memory: Any, t: float, h: float, steps: int, bound: float) -> tuple[Any, Tally]:
+        """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.kernel`.
+
+        Stops after a step whose kinetic energy is not below `bound`, and after one in which a disc loses its heading; the returned
+        state is then undefined. Raises `Cut` on Ctrl-C, heard in every sweep, where Python's handler of it does not raise itself.
         """
+        from discs.kernels import driver
+
+        kind, n = type(memory), memory.hi.shape[1]
+        before = kind(*(array.reshape(-1, n).copy() for array in memory))
+        after = kind(*(np.empty_like(array) for array in before))
+        tally = Tally(*driver.march(self.parameters, chain, before, after, t, h, steps, bound))
+        if tally.steps < 0:
+            signal.raise_signal(signal.SIGINT)
+            raise Cut
+        last = after if tally.steps % 2 else before
+        return kind(*(array.reshape(was.shape) for array, was in zip(last, memory, strict=True))), tally
 
 
 class OneStep(FixedStep):
     """A method whose step needs the state alone: the memory is the state, and frames are reached by a shorter step."""
 
     @abstractmethod
-    def step(self, system: RollingDiscs, z: Phase, h: float, work: Work) -> Phase:
-        """One step from z, a pure function of its arguments (work is counted up)."""
-
-    @abstractmethod
-    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        """The compiled twin of `steps` times `step`, in place; pi is (1, n), or (2, n) with own headings. Returns a tally's
-        entries."""
+    def step(self, system: RollingDiscs, z: Phase, t: float, h: float, work: Work) -> Phase:
+        """The state a step h after z at the time t, a pure function of its arguments (work is counted up)."""
 
     @final
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Phase:
         return z
 
     @final
-    def march(self, chain: Any, memory: Phase, h: float, steps: int, bound: float) -> tuple[Phase, Tally]:
-        z = Phase(memory.hi.copy(), memory.lo.copy(), memory.pi.copy())
-        return z, tally(self.kernel(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), h, steps, bound))
+    def advance(self, system: RollingDiscs, memory: Phase, t: float, h: float, work: Work) -> Phase:
+        return self.step(system, memory, t, h, work)
 
     @final
-    def advance(self, system: RollingDiscs, memory: Phase, h: float, work: Work) -> Phase:
-        return self.step(system, memory, h, work)
-
-    @final
-    def at(self, system: RollingDiscs, memory: Phase, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(self, system: RollingDiscs, memory: Phase, t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         if chain is None:
-            z = self.step(system, memory, tau, work) if tau else memory
+            z = self.step(system, memory, t, tau, work) if tau else memory
             return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
-        import discs.kernels.methods as methods
+        from discs.kernels import driver
 
         z, lost = memory, -1
         if tau:
-            z, done = self.march(chain, memory, tau, 1, np.inf)
-            work.add(done)
-            lost = done.lost
+            z, tally = self.march(chain, memory, t, tau, 1, np.inf)
+            work.add(tally)
+            lost = tally.lost
         rate, q = np.empty_like(z.hi), np.empty_like(z.hi)
-        energy, slip = methods.look(chain, z.hi, z.lo, z.pi.reshape(-1, z.hi.shape[1]), rate, q)
+        energy, slip = driver.look(chain, z._replace(pi=z.pi.reshape(-1, z.hi.shape[1])), rate, q)
         return Frame(z.hi, z.lo, rate, lost, (q, energy, slip))
 
     @final
-    def finer(self, system: RollingDiscs, memory: Phase, h: float, chain: Any = None) -> NDArray:
+    def finer(self, system: RollingDiscs, memory: Phase, t: float, h: float, chain: Any = None) -> NDArray:
         if chain is not None:
-            hi, pi = memory.hi.copy(), memory.pi.reshape(-1, memory.hi.shape[1]).copy()
-            tally(self.kernel(chain, hi, memory.lo.copy(), pi, 0.5 * h, 2, np.inf))
-            return hi
+            return self.march(chain, memory, t, 0.5 * h, 2, np.inf)[0].hi
         work = Work()
-        return self.step(system, self.step(system, memory, 0.5 * h, work), 0.5 * h, work).hi
+        return self.step(system, self.step(system, memory, t, 0.5 * h, work), t + 0.5 * h, 0.5 * h, work).hi
 
     @final
     def keep(self, memory: Phase) -> dict[str, Any]:

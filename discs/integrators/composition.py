@@ -2,15 +2,15 @@
 
 from abc import ABC
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.integrators.midpoint import Midpoint
-from discs.system import Phase, SkewGradient
+from discs.integrators.midpoint import Composed, Midpoint
+from discs.skew import Phase, SkewGradient
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,15 @@ class Composition(OneStep, ABC):
         if not isinstance(self.base, Midpoint):
             raise ValueError(f"base must be a Midpoint; got {checks.shown(self.base)}")
 
-    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         for fraction in self.fractions:
-            z = self.base.step(system, z, fraction * h, work)
+            z = self.base.step(system, z, t, fraction * h, work)
+            t += fraction * h
         return z
 
-    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        import discs.kernels.methods as methods
-
-        fractions = np.array(self.fractions)
-        return methods.compose(chain, hi, lo, pi, fractions, h, steps, self.base.sweeps, float(self.base.tolerance), bound)
+    @cached_property
+    def parameters(self) -> Composed:
+        return self.base.parameters._replace(fractions=np.array(self.fractions))
 
 
 SUZUKI = 1 / (4 - 4 ** (1 / 3))

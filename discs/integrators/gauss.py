@@ -2,21 +2,23 @@
 
 from abc import ABC
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, ClassVar, NamedTuple
+from functools import cache, cached_property
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.system import Phase, SkewGradient, add
+from discs.integrators.collocation import Collocation
+from discs.skew import Phase, SkewGradient, add
 
 
 class Tableau(NamedTuple):
     """Coefficients of an s-stage Gauss method.
 
-    a : (s, s). b : (s,), weights. last : (s,), b^T a^{-1}, which takes the stages' momenta to those at the end of the step.
+    a : (s, s). b, nodes : (s,), weights, and places in [0, 1].
+    last : (s,), b^T a^{-1}, which takes the stages' momenta to those at the end of the step.
 
     a is diagonalised: `real` holds its real eigenvalues (none or one) and `pairs` the complex ones with a positive imaginary
     part; in : (number, s), rows that take stages to the eigenvector's part, and out : (number, s), what it is in the stages,
@@ -25,6 +27,7 @@ class Tableau(NamedTuple):
 
     a: NDArray
     b: NDArray
+    nodes: NDArray
     last: NDArray
     real: NDArray
     real_in: NDArray
@@ -47,7 +50,7 @@ def tableau(stages: int) -> Tableau:
     last = np.linalg.solve(a.T, b)
     of_real = values[real].real, into[real].real, out.T[real].real
     of_pairs = values[upper].astype(complex), into[upper].astype(complex), 2 * out.T[upper].astype(complex)
-    return Tableau(a, b, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
+    return Tableau(a, b, c, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
 
 
 @dataclass(frozen=True)
@@ -81,8 +84,8 @@ class Gauss(OneStep, ABC):
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
 
-    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
-        a, b, last, real, real_in, real_out, pairs, pairs_in, pairs_out = tableau(self.stages)
+    def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
+        a, b, nodes, last, real, real_in, real_out, pairs, pairs_in, pairs_out = tableau(self.stages)
         shape = system.shape(z.hi, z.lo)
         middle = system.moved(shape, 0.5 * h * system.forward(system.frame(shape), z.pi))
         common = system.frame(middle)
@@ -92,11 +95,11 @@ class Gauss(OneStep, ABC):
         v = np.array([system.forward(common, stage) for stage in p])
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
             c = system.frames(shape, h * _mix(a, v))
-            force = system.forces(c, shape, h * _mix(a, system.forwards(c, p)))
+            force = system.pulls(c, shape, t + h * nodes, z, h * _mix(a, system.forwards(c, p)), p)
             rest = z.pi - p - h * _mix(a, force)
             change = np.zeros_like(p)
             for value, into, out in parts:
-                part = system.solve(secant, common, h * h * value**2, _mix(into, rest))
+                part = system.solve(secant, common, h * h * value**2, _mix(into, rest), h * value)
                 change += np.multiply.outer(out, part).real
             p = p + change
             v = system.forwards(c, p)
@@ -108,11 +111,9 @@ class Gauss(OneStep, ABC):
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
         return Phase(*add(z.hi, z.lo, h * _mix(b, v)), z.pi + _mix(last, p - z.pi))
 
-    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        import discs.kernels.collocation as collocation
-
-        coefficients = tuple(tableau(self.stages))
-        return collocation.gauss(chain, hi, lo, pi, coefficients, h, steps, self.sweeps, float(self.tolerance), bound)
+    @cached_property
+    def parameters(self) -> "Collocation":
+        return Collocation(*tableau(self.stages), self.sweeps, float(self.tolerance))
 
 
 def _mix(weights: NDArray, stages: NDArray) -> NDArray:

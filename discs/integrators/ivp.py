@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from discs import checks
 from discs.integrators import solvers
 from discs.integrators.base import Frame, Integrator, Work
-from discs.system import Phase, RollingDiscs
+from discs.skew import Phase
+from discs.system import RollingDiscs
 
 
 class Reduced:
-    """The reduced equations q. = C pi, pi. = -C^T grad V as y. = f(t, y), disc by disc: y = (x, y, theta, pi, ...) of disc 0,
+    """The reduced equations q. = C pi, pi. = -C^T (grad V - f) as y. = f(t, y), disc by disc: y = (x, y, theta, pi, ...) of disc 0,
     then 1 …
 
     Parameters
@@ -40,15 +41,15 @@ class Reduced:
     def __call__(self, t: float, y: NDArray) -> NDArray:
         """The rate of y."""
         if self.chain is not None:
-            import discs.kernels.methods as methods
+            from discs.kernels import driver
 
             out = np.empty_like(y)
-            methods.reduced(self.chain, np.ascontiguousarray(y), out)
+            driver.reduced(self.chain, t, np.ascontiguousarray(y), out)
             return out
         z = self.split(y)
         shape = self.system.shape(z.hi)
         c = self.system.frame(shape)
-        return self.join(self.system.forward(c, z.pi), -self.system.back(c, self.system.gradient(shape)))
+        return self.join(self.system.forward(c, z.pi), -self.system.pull(c, self.system.gradient(shape), t, z, 0.0, z.pi))
 
     @property
     def width(self) -> int:
@@ -89,6 +90,10 @@ class SolveIvp(Integrator, ABC):
         checks.number("rtol", self.rtol, positive=True)
         checks.number("atol", self.atol, positive=True)
 
+    @property
+    def compiles(self) -> bool:
+        return True
+
     def options(self, f: Reduced) -> dict[str, Any]:
         """What the method is told about the Jacobian."""
         return {}
@@ -103,10 +108,10 @@ class SolveIvp(Integrator, ABC):
             solver.lu = lambda matrix: solvers.Factors(matrix, make)
         return Course(f, solver, 0.0, z)
 
-    def advance(self, system: RollingDiscs, memory: "Course", h: float, work: Work) -> "Course":
+    def advance(self, system: RollingDiscs, memory: "Course", t: float, h: float, work: Work) -> "Course":
         return memory.to(memory.time + h, work)
 
-    def at(self, system: RollingDiscs, memory: "Course", tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(self, system: RollingDiscs, memory: "Course", t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         z = memory.to(memory.time + tau, work) if tau else memory
         return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
 

@@ -3,11 +3,17 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
-from discs.integrators.base import FixedStep, Frame, Tally, Work, tally
+from discs.integrators.base import FixedStep, Frame, Work
 from discs.integrators.rk4 import RK4
-from discs.system import Phase, RollingDiscs, add
+from discs.kernels import protocol as do
+from discs.kernels.compiled import Cost, fill
+from discs.kernels.shared import add as advance
+from discs.kernels.shared import back, copy, forward, square
+from discs.skew import Phase, add
+from discs.system import RollingDiscs
 
 
 class TwoStep(NamedTuple):
@@ -42,15 +48,16 @@ class Leapfrog(FixedStep):
     preserves: ClassVar[str] = "a modified energy exactly; the rolling constraint of the central differences"
     reference: ClassVar[str] = "Vankerschaver, A class of nonholonomic kinematic constraints in elasticity, section 4.3"
     stability_limit: ClassVar[float] = 2.0
+    takes_loads: ClassVar[bool] = False
     offers: ClassVar[tuple[str, ...]] = ("modified_energy",)
 
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> TwoStep:
-        first = RK4().step(system, z, h, work)
+        first = RK4().step(system, z, 0.0, h, work)
         move = (first.hi - z.hi) + (first.lo - z.lo)
         central = 2 * h * system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi)
         return TwoStep(z.hi, z.lo, central - move, move)
 
-    def advance(self, system: RollingDiscs, memory: TwoStep, h: float, work: Work) -> TwoStep:
+    def advance(self, system: RollingDiscs, memory: TwoStep, t: float, h: float, work: Work) -> TwoStep:
         hi, lo = add(memory.hi, memory.lo, memory.next)
         shape = system.shape(hi, lo)
         c = system.frame(shape)
@@ -58,21 +65,19 @@ class Leapfrog(FixedStep):
         work.gradients += 1
         return TwoStep(hi, lo, memory.next, system.forward(c, system.back(c, free)) - memory.next)
 
-    def march(self, chain: Any, memory: TwoStep, h: float, steps: int, bound: float) -> tuple[TwoStep, Tally]:
-        import discs.kernels.methods as methods
+    @property
+    def parameters(self) -> "Central":
+        return CENTRAL
 
-        after = TwoStep(*(array.copy() for array in memory))
-        return after, tally(methods.leapfrog(chain, *after, h, steps, bound))
-
-    def at(self, system: RollingDiscs, memory: TwoStep, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(self, system: RollingDiscs, memory: TwoStep, t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         rate = (memory.last + memory.next) / (2 * h)
         if not tau:
             return Frame(memory.hi, memory.lo, rate)
-        return RK4().at(system, self._phase(system, memory, rate), tau, h, work, chain)
+        return RK4().at(system, self._phase(system, memory, rate), t, tau, h, work, chain)
 
-    def finer(self, system: RollingDiscs, memory: TwoStep, h: float, chain: Any = None) -> NDArray:
+    def finer(self, system: RollingDiscs, memory: TwoStep, t: float, h: float, chain: Any = None) -> NDArray:
         rate = (memory.last + memory.next) / (2 * h)
-        return RK4().at(system, self._phase(system, memory, rate), h, h, Work(), chain).hi
+        return RK4().at(system, self._phase(system, memory, rate), t, h, h, Work(), chain).hi
 
     def _phase(self, system: RollingDiscs, memory: TwoStep, rate: NDArray) -> Phase:
         pi = system.back(system.frame(system.shape(memory.hi, memory.lo)), system.weights * rate)
@@ -91,3 +96,66 @@ class Leapfrog(FixedStep):
         shape = system.shape(memory.hi, memory.lo)
         polarised = system.polarised(shape, system.moved(shape, memory.next))
         return {"modified_energy": self.kinetic(system, memory, h) + polarised}
+
+
+class Central(NamedTuple):
+    """The compiled form needs no numbers but a kind of its own."""
+
+    weight: float
+
+
+CENTRAL = Central(2.0)  # of the move before, in M (q* - q_{n-1})
+
+
+class Room(NamedTuple):
+    """c, still (zero), g like positions; p like momenta."""
+
+    c: NDArray
+    still: NDArray
+    g: NDArray
+    p: NDArray
+
+
+@fill(do.room, Central, _nrt=True)
+def _room(method: Central, chain: Any, state: TwoStep) -> Room:
+    q = state.hi
+    return Room(np.empty_like(q), np.zeros_like(q), np.empty_like(q), np.empty((q.shape[0] - 2, q.shape[1])))
+
+
+@fill(do.step, Central)
+def _step(method: Central, chain: Any, work: Any, room: Room, before: TwoStep, after: TwoStep, t: float, h: float) -> Cost:
+    c, still, g, p = room
+    advance(before, before.next, 1.0, after)
+    do.settle(chain, work, after.hi, after.lo)
+    do.frame(chain, work, still, c)
+    do.gradient(chain, work, still, g)
+    for row in range(g.shape[0]):
+        w, move, to = chain.weights[row], before.next[row], g[row]
+        for k in range(to.size):
+            to[k] = method.weight * w[k] * move[k] - h * h * to[k]
+    back(c, g, p)
+    copy(before.next, after.last)
+    forward(c, p, after.next)
+    for row in range(g.shape[0]):
+        last, to = before.next[row], after.next[row]
+        for k in range(to.size):
+            to[k] -= last[k]
+    return 1, 0, 0
+
+
+@fill(do.jumps, Central)
+def _jumps(method: Central) -> bool:
+    return False  # its moves are its velocities
+
+
+@fill(do.kinetic, TwoStep)
+def _kinetic(state: TwoStep, chain: Any, h: float) -> float:
+    total = 0.0
+    for row in range(state.next.shape[0]):
+        total += square(chain.weights[row], state.next[row])
+    return 0.5 * total / (h * h)
+
+
+@fill(do.rate, TwoStep)
+def _rate(state: TwoStep, chain: Any, work: Any, c: NDArray, tau: float, move: NDArray) -> None:
+    copy(state.next, move)

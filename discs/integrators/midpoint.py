@@ -1,14 +1,19 @@
 """Implicit midpoint in (q, pi), solved by sweeps with frozen geometry."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.system import Phase, SkewGradient, add
+from discs.kernels import protocol as do
+from discs.kernels.compiled import CUT, Cost, fill, interrupted
+from discs.kernels.shared import add as advance
+from discs.kernels.shared import copy, renew
+from discs.skew import Phase, SkewGradient, add
 
 WHOLE = np.ones(1)  # the fractions of a step that a composition of this one alone takes
 
@@ -56,16 +61,18 @@ class Midpoint(OneStep):
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
 
-    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)
         p, move = z.pi, 0.5 * h * system.forward(system.frame(shape), z.pi)
         guide: tuple[Any, Any] | None = None
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
             c = system.frame(system.moved(shape, move))
-            secant = system.secant(shape, h * system.forward(c, p))
+            velocity = system.forward(c, p)
+            secant = system.secant(shape, h * velocity)
             if guide is None or system.quadratic:
                 guide = secant, c
-            change = system.solve(*guide, 0.25 * h * h, z.pi - p - 0.5 * h * system.back(c, system.mean_force(secant)))
+            pull = system.pull(c, system.mean_force(secant), t + 0.5 * h, z, 0.5 * h * velocity, p)
+            change = system.solve(*guide, 0.25 * h * h, z.pi - p - 0.5 * h * pull, 0.5 * h)
             p = p + change
             last, move = move, 0.5 * h * system.forward(c, p)
             if (np.abs(move - last).max(axis=1) <= self.tolerance * system.scale).all():
@@ -75,7 +82,62 @@ class Midpoint(OneStep):
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
         return Phase(*add(z.hi, z.lo, 2 * move), 2 * p - z.pi)
 
-    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        import discs.kernels.methods as methods
+    @cached_property
+    def parameters(self) -> "Composed":
+        return Composed(WHOLE, self.sweeps, float(self.tolerance))
 
-        return methods.compose(chain, hi, lo, pi, WHOLE, h, steps, self.sweeps, float(self.tolerance), bound)
+
+class Composed(NamedTuple):
+    """Midpoint steps of fractions (stages,) of h, for the compiled form."""
+
+    fractions: NDArray
+    sweeps: int
+    tolerance: float
+
+
+class Room(NamedTuple):
+    """p like momenta, move and still (zero) like positions, change (n,)."""
+
+    p: NDArray
+    move: NDArray
+    still: NDArray
+    change: NDArray
+
+
+@fill(do.room, Composed, _nrt=True)
+def _room(method: Composed, chain: Any, state: Phase) -> Room:
+    return Room(np.empty_like(state.pi), np.empty_like(state.hi), np.zeros_like(state.hi), np.empty(state.hi.shape[1]))
+
+
+@fill(do.step, Composed)
+def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
+    p, move, now, time = room.p, room.move, before, t
+    solves, unconverged = 0, 0
+    for part in range(method.fractions.size):
+        tau = method.fractions[part] * h
+        if part:
+            now = after
+            do.settle(chain, work, now.hi, now.lo)
+        do.frame(chain, work, room.still, work.c)
+        copy(now.pi, p)
+        renew(work.c, p, 0.5 * tau, move, chain.scale, room.change)
+        sweep, change = 0, np.inf
+        while sweep < method.sweeps and not change <= method.tolerance:
+            if interrupted():
+                return CUT
+            change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
+            sweep += 1
+        time += tau
+        solves += sweep
+        unconverged += method.tolerance > 0 and sweep == method.sweeps
+        advance(now, move, 2.0, after)
+        for row in range(p.shape[0]):
+            mean, start, end = p[row], now.pi[row], after.pi[row]
+            for i in range(mean.size):
+                end[i] = 2 * mean[i] - start[i]
+    return solves, solves, unconverged
+
+
+@fill(do.jumps, Composed)
+def _jumps(method: Composed) -> bool:
+    return False

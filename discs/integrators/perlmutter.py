@@ -1,14 +1,20 @@
 """The reversible scheme of McLachlan and Perlmutter."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.system import Phase, RollingDiscs, add
+from discs.kernels import protocol as do
+from discs.kernels.compiled import CUT, Cost, fill, interrupted
+from discs.kernels.shared import add as advance
+from discs.kernels.shared import back, forward, largest
+from discs.skew import Phase, add
+from discs.system import RollingDiscs
 
 
 @dataclass(frozen=True)
@@ -38,11 +44,12 @@ class McLachlanPerlmutter(OneStep):
     preserves: ClassVar[str] = "reversibility; the rolling constraint at the ends of steps"
     reference: ClassVar[str] = "McLachlan, Perlmutter, J. Nonlinear Sci. 16 (2006) 283, (4.18)"
     stability_limit: ClassVar[float] = 2.0
+    takes_loads: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
 
-    def step(self, system: RollingDiscs, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: RollingDiscs, z: Phase, t: float, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)
         v = system.forward(system.frame(shape), z.pi)
         half, move = 0.5 * h * v, h * v
@@ -59,7 +66,106 @@ class McLachlanPerlmutter(OneStep):
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
         return Phase(*add(z.hi, z.lo, move), pi)
 
-    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        import discs.kernels.methods as methods
+    @cached_property
+    def parameters(self) -> "Swept":
+        return Swept(self.sweeps, float(self.tolerance))
 
-        return methods.perlmutter(chain, hi, lo, pi, h, steps, self.sweeps, float(self.tolerance), bound)
+
+class Swept(NamedTuple):
+    """The limits of the iteration, for the compiled form."""
+
+    sweeps: int
+    tolerance: float
+
+
+class Room(NamedTuple):
+    """Arrays like positions: c, after, still (zero), half, move, v, g. Like momenta: pull, share, ones. change (n,)."""
+
+    c: NDArray
+    after: NDArray
+    still: NDArray
+    half: NDArray
+    move: NDArray
+    v: NDArray
+    g: NDArray
+    pull: NDArray
+    share: NDArray
+    ones: NDArray
+    change: NDArray
+
+
+@fill(do.room, Swept, _nrt=True)
+def _room(method: Swept, chain: Any, state: Phase) -> Room:
+    q, pi = state.hi, state.pi
+    one, two, three, four, five, six = (
+        np.empty_like(q),
+        np.empty_like(q),
+        np.empty_like(q),
+        np.empty_like(q),
+        np.empty_like(q),
+        np.empty_like(q),
+    )
+    return Room(
+        one,
+        two,
+        np.zeros_like(q),
+        three,
+        four,
+        five,
+        six,
+        np.empty_like(pi),
+        np.empty_like(pi),
+        np.ones_like(pi),
+        np.empty(q.shape[1]),
+    )
+
+
+@fill(do.step, Swept)
+def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
+    c, end, still, half, move, v, g, pull, share, ones, change = room
+    do.frame(chain, work, still, c)
+    forward(c, before.pi, v)
+    for row in range(v.shape[0]):
+        rate, part, whole = v[row], half[row], move[row]
+        for k in range(rate.size):
+            part[k] = 0.5 * h * rate[k]
+            whole[k] = 2 * part[k]
+    do.frame(chain, work, half, c)
+    do.gradient(chain, work, half, g)
+    for row in range(v.shape[0]):
+        w, rate, to = chain.weights[row], v[row], g[row]
+        for k in range(to.size):
+            to[k] = w[k] * rate[k] - h * to[k]
+    back(c, g, pull)
+    sweep, moved = 0, np.inf
+    while sweep < method.sweeps and not moved <= method.tolerance:
+        if interrupted():
+            return CUT
+        sweep += 1
+        do.frame(chain, work, move, end)
+        forward(end, ones, v)
+        for row in range(v.shape[0]):
+            w, to = chain.weights[row], v[row]
+            for k in range(to.size):
+                to[k] *= w[k]
+        back(c, v, share)
+        for row in range(pull.shape[0]):
+            a, b, to = pull[row], share[row], after.pi[row]
+            for k in range(to.size):
+                to[k] = a[k] / b[k]
+        forward(end, after.pi, v)
+        moved = 0.0
+        for row in range(v.shape[0]):
+            rate, part, whole = v[row], half[row], move[row]
+            for k in range(rate.size):
+                new = part[k] + 0.5 * h * rate[k]
+                change[k] = abs(new - whole[k])
+                whole[k] = new
+            moved = max(moved, largest(change) / chain.scale[row])
+    advance(before, move, 1.0, after)
+    return 1, 0, method.tolerance > 0 and sweep == method.sweeps
+
+
+@fill(do.jumps, Swept)
+def _jumps(method: Swept) -> bool:
+    return True

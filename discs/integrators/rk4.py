@@ -1,13 +1,18 @@
 """The classical explicit Runge-Kutta method on the reduced equations."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs.integrators.base import OneStep, Work
-from discs.system import Phase, SkewGradient, add
+from discs.kernels import protocol as do
+from discs.kernels.compiled import Cost, fill
+from discs.kernels.shared import add as advance
+from discs.kernels.shared import copy, forward
+from discs.skew import Phase, SkewGradient, add
 
 
 @dataclass(frozen=True)
@@ -21,23 +26,79 @@ class RK4(OneStep):
     reference: ClassVar[str] = "Kutta, Z. Math. Phys. 46 (1901) 435"
     stability_limit: ClassVar[float] = 2.8
 
-    def step(self, system: SkewGradient, z: Phase, h: float, work: Work) -> Phase:
+    def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)
         work.gradients += 4
 
-        def rate(dq: NDArray, dpi: NDArray) -> tuple[NDArray, NDArray]:
-            moved = system.moved(shape, dq)
+        def rate(tau: float, dq: NDArray, dpi: NDArray) -> tuple[NDArray, NDArray]:
+            moved, p = system.moved(shape, dq), z.pi + dpi
             c = system.frame(moved)
-            return system.forward(c, z.pi + dpi), -system.back(c, system.gradient(moved))
+            return system.forward(c, p), -system.pull(c, system.gradient(moved), t + tau, z, dq, p)
 
-        q1, p1 = rate(np.zeros_like(z.hi), np.zeros_like(z.pi))
-        q2, p2 = rate(h / 2 * q1, h / 2 * p1)
-        q3, p3 = rate(h / 2 * q2, h / 2 * p2)
-        q4, p4 = rate(h * q3, h * p3)
+        q1, p1 = rate(0.0, np.zeros_like(z.hi), np.zeros_like(z.pi))
+        q2, p2 = rate(h / 2, h / 2 * q1, h / 2 * p1)
+        q3, p3 = rate(h / 2, h / 2 * q2, h / 2 * p2)
+        q4, p4 = rate(h, h * q3, h * p3)
         dq, dpi = (h / 6 * (a + 2 * b + 2 * c + d) for a, b, c, d in ((q1, q2, q3, q4), (p1, p2, p3, p4)))
         return Phase(*add(z.hi, z.lo, dq), z.pi + dpi)
 
-    def kernel(self, chain: Any, hi: NDArray, lo: NDArray, pi: NDArray, h: float, steps: int, bound: float) -> Any:
-        import discs.kernels.methods as methods
+    @cached_property
+    def parameters(self) -> "Explicit":
+        return Explicit(np.array([0.0, 0.5, 0.5, 1.0, 0.0]), np.array([1.0, 2.0, 2.0, 1.0]))
 
-        return methods.rk4(chain, hi, lo, pi, h, steps, bound)
+
+class Explicit(NamedTuple):
+    """For the compiled form: what parts of h the stages are at (4,), and one more; their weights (4,)."""
+
+    nodes: NDArray
+    weights: NDArray
+
+
+class Room(NamedTuple):
+    """c, move, v and their total like positions; g, kick and p like momenta."""
+
+    c: NDArray
+    move: NDArray
+    v: NDArray
+    total: NDArray
+    g: NDArray
+    kick: NDArray
+    p: NDArray
+
+
+@fill(do.room, Explicit, _nrt=True)
+def _room(method: Explicit, chain: Any, state: Phase) -> Room:
+    c, move, v, total = np.empty_like(state.hi), np.empty_like(state.hi), np.empty_like(state.hi), np.empty_like(state.hi)
+    return Room(c, move, v, total, np.empty_like(state.pi), np.empty_like(state.pi), np.empty_like(state.pi))
+
+
+@fill(do.step, Explicit)
+def _step(method: Explicit, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
+    c, move, v, total, g, kick, p = room
+    nodes, weights, pi = method.nodes, method.weights, before.pi
+    move[:], total[:], kick[:] = 0.0, 0.0, 0.0
+    copy(pi, p)
+    for i in range(4):
+        do.frame(chain, work, move, c)
+        forward(c, p, v)
+        do.pullback(chain, work, before, t + nodes[i] * h, move, c, p, g)
+        for row in range(v.shape[0]):
+            rate, so_far, to = v[row], total[row], move[row]
+            for k in range(rate.size):
+                so_far[k] += weights[i] * rate[k]
+                to[k] = nodes[i + 1] * h * rate[k]
+        for row in range(g.shape[0]):
+            pull, so_far, start, to = g[row], kick[row], pi[row], p[row]
+            for k in range(pull.size):
+                so_far[k] += weights[i] * pull[k]
+                to[k] = start[k] - nodes[i + 1] * h * pull[k]
+    advance(before, total, h / 6, after)
+    for row in range(g.shape[0]):
+        for k in range(g.shape[1]):
+            after.pi[row, k] = pi[row, k] - h / 6 * kick[row, k]
+    return 4, 0, 0
+
+
+@fill(do.jumps, Explicit)
+def _jumps(method: Explicit) -> bool:
+    return True

@@ -1,13 +1,18 @@
-"""How kernels are compiled: `kernel` for those called from Python, `part` for their parts, `fill` for the parts that differ by
-chain. With NUMBA_DISABLE_JIT=1 all run as plain Python, for a debugger and to see which lines are reached.
+"""How kernels are compiled: `kernel` for those called from Python, `part` for what they call, `stub` and `fill` for what differs by
+chain or by method.
 
-Kernels are cached on disc, so compiling is paid once per machine. numba knows a cached kernel by the file it stands in, not by
-those it calls; the cache is therefore kept in a folder named by the content of all kernels: NUMBA_CACHE_DIR if it is set, otherwise
-`__pycache__` beside the kernels, otherwise the user's cache. Where none can be written every process compiles, and warns of it.
+Parts are plain Python functions; numba is told of them, and imported, when the first kernel is. With NUMBA_DISABLE_JIT=1 all run as
+plain Python, for a debugger and to see which lines are reached.
+
+Compiled kernels are cached on disc, so compiling is paid once per machine. numba knows a cached kernel by the file it stands in,
+not by those it calls. So each pair of a method and a chain has its kernel cached in a folder named by the content of all files that
+it may call: in NUMBA_CACHE_DIR if it is set, otherwise in `__pycache__` beside the kernels, otherwise in the user's cache. Where
+none can be written every process compiles, and warns of it.
 """
 
 import hashlib
 import inspect
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -16,35 +21,135 @@ from functools import cache, partial, singledispatch, wraps
 from pathlib import Path
 from typing import Any
 
-import numba
-from numba.core import event, types
-from numba.extending import overload
-from numba.misc.appdirs import user_cache_dir
-
 from discs.warn import warn
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # Parts of a kernel: no counting of references, as what they are given is held by the kernel and they make no arrays; no way in
 # from Python.
 PART: dict[str, Any] = OPTIONS | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
+HERE = Path(__file__).parent
 ROOM = 2**20  # bytes that a kernel may take on disc
+CUT = -1, 0, 0  # in place of a step's cost, where Ctrl-C was pressed
+Cost = tuple[int, int, int]  # of a step: gradients, solves, iterations that ended on their limit
+
+_WAITING: list[Callable[[], object]] = []  # what numba is to be told of
+_FILES: dict[type, set[Path]] = {}  # where the forms for a chain or a method stand
 
 
-def _content(folder: Path) -> str:
-    """What tells kernels of a folder from all others: they may call all that is in it, and all that is here."""
-    here = Path(__file__).parent
-    sources = sorted(here.glob("*.py")) + sorted(folder.glob("*.py")) * (folder != here)
+def _tell(what: Callable[[], object]) -> None:
+    """Tell numba now if it is imported, else when it is."""
+    _WAITING.append(what)
+    if "numba" in sys.modules:
+        tell_numba()
+
+
+def tell_numba() -> None:
+    """Tell numba of all parts and forms."""
+    while _WAITING:
+        _WAITING.pop(0)()
+
+
+def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """A function that kernels call, and that makes no arrays."""
+    if function is None:
+        return partial(part, **options)
+
+    def tell() -> None:
+        from numba.extending import register_jitable
+
+        register_jitable(**PART | options)(function)
+
+    _tell(tell)
+    return function
+
+
+def stub(function: Callable[..., Any]) -> Any:
+    """A function that every chain, or every method, has its form for, told by the type of its first argument; see `fill`."""
+
+    @wraps(function)
+    def missing(first: Any, *rest: Any) -> Any:
+        raise NotImplementedError(f"{type(first).__name__} has no {function.__name__}")
+
+    return singledispatch(missing)
+
+
+def fill(of: Any, kind: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a stub its form for one kind of parameters, a NamedTuple."""
+
+    def register(function: Callable[..., Any]) -> Callable[..., Any]:
+        _FILES.setdefault(kind, set()).add(Path(inspect.getfile(function)))
+
+        def tell() -> None:
+            from numba.extending import overload
+
+            def choose(first: Any, *rest: Any) -> Any:
+                return function if getattr(first, "instance_class", None) is kind else None
+
+            choose.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba asks for the same one
+            overload(of, jit_options=PART | options)(choose)
+
+        _tell(tell)
+        of.register(kind, function)
+        return function
+
+    return register
+
+
+def jit(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that calls parts and forms, compiled for this process alone."""
+    import numba
+
+    tell_numba()
+    return numba.njit(**OPTIONS)(function)
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function called from Python, whose arguments that are NamedTuples, of a chain or of a method, tell what it calls; compiled
+    at its first call with each."""
+
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        kinds: list[Any] = [type(argument) for argument in arguments if type(argument) in _FILES]
+        return compiled(function, *kinds)(*arguments)
+
+    return call
+
+
+@cache
+def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
+    """A kernel for these kinds of parameters, as numba has it."""
+    import numba
+
+    tell_numba()
+    files = sorted({path for kind in kinds for path in _FILES[kind]} | {Path(inspect.getfile(function))})
+    kept = _cache(tuple(files))
+    if not kept:
+        _warn_of_no_cache()
+        return jit(function)
+    own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, kept
+    try:
+        return numba.njit(cache=True, **OPTIONS)(function)
+    finally:
+        numba.config.CACHE_DIR = own
+
+
+def _content(files: tuple[Path, ...]) -> str:
+    """What tells kernels that call what stands in these files from all others; in a package they may call all beside it."""
+    folders = {HERE} | {path.parent for path in files if (path.parent / "__init__.py").exists()}
+    sources = sorted({*files, *(source for folder in folders for source in folder.glob("*.py"))})
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
 
 
 @cache
-def _cache(folder: Path) -> str:
-    """Where compiled kernels of a folder are kept; "" if nothing can be written anywhere."""
+def _cache(files: tuple[Path, ...]) -> str:
+    """Where kernels that call what stands in these files are kept; "" if nothing can be written anywhere."""
+    import numba
+    from numba.misc.appdirs import user_cache_dir
+
     users = user_cache_dir("rolling-discs")  # relative if XDG_CACHE_HOME is empty, which stands for unset
-    bases = numba.config.CACHE_DIR, Path(__file__).parent / "__pycache__", users if Path(users).is_absolute() else ""
+    bases = numba.config.CACHE_DIR, HERE / "__pycache__", users if Path(users).is_absolute() else ""
     for base in filter(None, bases):
-        kept = Path(base) / f"kernels-{_content(folder)}"
+        kept = Path(base) / f"kernels-{_content(files)}"
         try:
             kept.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=kept) as file:
@@ -56,38 +161,23 @@ def _cache(folder: Path) -> str:
     return ""
 
 
-uncached: list[Path] = []  # folders of kernels that cannot be kept
+uncached: list[bool] = []  # whether kernels could not be kept
 
 
-def _warn_of_no_cache(folder: Path) -> None:
-    uncached.append(folder)
-    if len(uncached) > 1:
-        return
-    warn(
-        "compiled kernels cannot be kept, as neither the package's folder nor the user's cache can be written: every process "
-        "compiles them again, which takes some tens of seconds; set NUMBA_CACHE_DIR to a folder that can be written"
-    )
-
-
-def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Compile a function at its first call."""
-    if function is None:
-        return partial(kernel, **options)
-    folder = Path(inspect.getfile(function)).parent
-    kept = _cache(folder)
-    if not kept:
-        _warn_of_no_cache(folder)
-        return numba.njit(**OPTIONS | options)(function)
-    own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, kept
-    try:
-        return numba.njit(cache=True, **OPTIONS | options)(function)
-    finally:
-        numba.config.CACHE_DIR = own
+def _warn_of_no_cache() -> None:
+    if not uncached:
+        uncached.append(True)
+        warn(
+            "compiled kernels cannot be kept, as neither the package's folder nor the user's cache can be written: every process "
+            "compiles them again, which takes some tens of seconds; set NUMBA_CACHE_DIR to a folder that can be written"
+        )
 
 
 @contextmanager
 def compiling(say: Callable[[], None], after: float) -> Iterator[None]:
     """Call `say` once numba has compiled for so many seconds; kernels that it reads from the cache do not count."""
+    from numba.core import event
+
     notice = threading.Timer(after, say)
     notice.daemon = True
 
@@ -106,43 +196,23 @@ def compiling(say: Callable[[], None], after: float) -> Iterator[None]:
         notice.cancel()
 
 
-def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Compile a function that only kernels call, and that makes no arrays."""
-    return partial(part, **options) if function is None else numba.njit(**PART | options)(function)
-
-
-_interrupt_occurred = types.ExternalFunction("PyOS_InterruptOccurred", types.int32())
-COMPILED = not numba.config.DISABLE_JIT  # plain Python hears Ctrl-C by itself
-
-
-@part
-def interrupted():
+def interrupted() -> bool:
     """Whether Ctrl-C was pressed since the call began; a kernel that hears it ends at once with -1 steps.
 
-    Asking clears it: the caller has to press again, see `discs.integrators.base.tally`.
+    Asking clears it: the caller has to press again, see `discs.integrators.base.FixedStep`. Plain Python hears it by itself.
     """
-    return COMPILED and _interrupt_occurred() != 0
+    return False
 
 
-def stub(function: Callable[..., Any]) -> Any:
-    """A function that every chain has its form for, told by the type of its first argument; see `fill`."""
+def _tell_of_interrupts() -> None:
+    from numba.core import types
+    from numba.extending import overload
 
-    @wraps(function)
-    def missing(chain: Any, *rest: Any) -> Any:
-        raise NotImplementedError(f"{type(chain).__name__} has no {function.__name__}")
+    occurred = types.ExternalFunction("PyOS_InterruptOccurred", types.int32())
 
-    return singledispatch(missing)
+    @overload(interrupted, jit_options=PART)
+    def _interrupted() -> Callable[[], bool]:
+        return lambda: occurred() != 0
 
 
-def fill(of: Any, chain: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Give a stub its form for one `chain`."""
-
-    def register(function: Callable[..., Any]) -> Callable[..., Any]:
-        def choose(first: Any, *rest: Any) -> Any:
-            return function if getattr(first, "instance_class", None) is chain else None
-
-        choose.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba asks for the same one
-        overload(of, jit_options=PART | options)(choose)
-        return of.register(chain, function)
-
-    return register
+_tell(_tell_of_interrupts)

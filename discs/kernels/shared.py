@@ -3,8 +3,9 @@
 c, v : (rows, n). p : (1, n), or (2, n) with own headings.
 """
 
-from discs.kernels import chain as do
-from discs.kernels.compiled import part
+from discs.kernels import protocol as do
+from discs.kernels.compiled import fill, part
+from discs.skew import Phase
 
 
 @part
@@ -60,36 +61,55 @@ def renew(c, p, tau, move, scale, change):
 
 
 @part
-def add(hi, lo, increment, factor):
-    """hi + lo += factor * increment, without losing low digits (Knuth's two-sum)."""
-    for row in range(hi.shape[0]):
-        a, b, d = hi[row], lo[row], increment[row]
+def add(state, increment, factor, to):
+    """Positions of `to` = those of `state` + factor * increment, without losing low digits (Knuth's two-sum)."""
+    for row in range(increment.shape[0]):
+        a, b, d, hi, lo = state.hi[row], state.lo[row], increment[row], to.hi[row], to.lo[row]
         for i in range(a.size):
             term = factor * d[i] + b[i]
             total = a[i] + term
             part = total - a[i]
-            b[i] = (a[i] - (total - part)) + (term - part)
-            a[i] = total
+            lo[i] = (a[i] - (total - part)) + (term - part)
+            hi[i] = total
 
 
-@part
-def kinetic(pi):
-    """|pi|^2/2, the kinetic energy."""
+@part(fastmath={"contract", "reassoc"})
+def square(a, b):
+    """Sum of a b^2, both (n,)."""
     total = 0.0
-    for row in range(pi.shape[0]):
-        for i in range(pi.shape[1]):
-            total += pi[row, i] * pi[row, i]
+    for i in range(a.size):
+        total += a[i] * b[i] * b[i]
+    return total
+
+
+@fill(do.kinetic, Phase, fastmath={"contract", "reassoc"})
+def _kinetic(state, chain, h):
+    total = 0.0
+    for row in range(state.pi.shape[0]):
+        pi = state.pi[row]
+        for i in range(pi.size):
+            total += pi[i] * pi[i]
     return 0.5 * total
 
 
+@fill(do.rate, Phase)
+def _rate(state, chain, work, c, tau, move):
+    move[:] = 0.0
+    do.frame(chain, work, move, c)
+    forward(c, state.pi, move, tau)
+
+
 @part
-def ahead(chain, work, hi, lo, half, slope):
-    """A disc that loses its heading if all go on straight from the base hi + lo by twice `half`, or -1; `half` is overwritten."""
-    for row in range(hi.shape[0]):
-        for i in range(hi.shape[1]):
-            half[row, i] = hi[row, i] + 2 * half[row, i]
-    do.settle(chain, work, half, lo)
+def ahead(chain, work, state, half, slope):
+    """A disc that loses its heading if all go on straight from a state by twice `half`, or -1; `slope` is the state's.
+
+    `half` is overwritten.
+    """
+    for row in range(half.shape[0]):
+        for i in range(half.shape[1]):
+            half[row, i] = state.hi[row, i] + 2 * half[row, i]
+    do.settle(chain, work, half, state.lo)
     lost = do.lost(chain, work, slope)
-    do.settle(chain, work, hi, lo)
+    do.settle(chain, work, state.hi, state.lo)
     do.lost(chain, work, slope)
     return lost

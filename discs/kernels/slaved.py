@@ -5,16 +5,17 @@ same; at free ends they are the ghosts that make the headings there central, d_0
 3 d_1 - 3 d_2 + d_3 ("consistent").
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs.chain import Chain
-from discs.kernels import chain
+from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.limits import LOST_HEADING
-from discs.kernels.shared import renew
+from discs.kernels.load import UNLOADED
+from discs.kernels.shared import forward, renew
 from discs.kernels.slaved_matrix import GHOST, PLAIN, RING, Matrix, assemble, factor, solve
 from discs.springs import LinearCurvature
 
@@ -39,10 +40,13 @@ class Slaved(NamedTuple):
     k: float
     ends: int
     unit: bool
+    load: Any
 
 
-def parameters(given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, springs: LinearCurvature) -> Slaved:
-    """The parameters of a chain."""
+def parameters(
+    given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, springs: LinearCurvature, load: Any = None
+) -> Slaved:
+    """The parameters of a chain and its load."""
     n, ring = given.n, given.ends == "ring"
     torsion, corner = np.zeros(n + 1), np.zeros(2)
     torsion[1 : n + ring] = springs.twist
@@ -62,32 +66,40 @@ def parameters(given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, s
         k=given.k,
         ends=RING if ring else GHOST if given.ends == "consistent" else PLAIN,
         unit=given.rolling == "unit",
+        load=load or UNLOADED,
     )
 
 
 class Work(NamedTuple):
-    """base : links of the base position. links, tension : of a position. c : C. rhs : (1, n). matrix : real factors."""
+    """base : links of the base position. links, tension : of a position. c : C. step : (3, n), for loads. rhs : (1, n)."""
 
     base: NDArray
     links: NDArray
     tension: NDArray
     c: NDArray
+    step: NDArray
     rhs: NDArray
     matrix: Matrix
 
 
-@fill(chain.workspace, Slaved, _nrt=True)
+@fill(do.workspace, Slaved, _nrt=True)
 def _workspace(chain):
     n = chain.radius.size
     matrix = Matrix(np.empty(n), np.empty(n), np.empty(n), np.empty(2), np.empty((2, n)), np.empty(9))
-    return Work(np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.empty((3, n)), np.empty((1, n)), matrix)
+    base, links, tension = np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1))
+    return Work(base, links, tension, np.empty((3, n)), np.empty((3, n * do.loaded(chain.load))), np.empty((1, n)), matrix)
 
 
-@fill(chain.factors, Slaved, _nrt=True)
-def _factors(chain, g):
-    n, kind = chain.radius.size, np.array([g])
-    new = np.empty(3 * n, kind.dtype), np.empty(2, kind.dtype), np.empty((2, n), kind.dtype), np.empty(9, kind.dtype)
-    return Matrix(new[0][:n], new[0][n : 2 * n], new[0][2 * n :], new[1], new[2], new[3])
+@fill(do.factors, Slaved, _nrt=True)
+def _factors(chain, g, count):
+    n, kind = chain.radius.size, np.array([g]).dtype
+    a, u, w = np.empty((count, n), kind), np.empty((count, n), kind), np.empty((count, n), kind)
+    return Matrix(a, u, w, np.empty((count, 2), kind), np.empty((count, 2, n), kind), np.empty((count, 9), kind))
+
+
+@fill(do.pick, Slaved)
+def _pick(chain, m, j):
+    return Matrix(m.a[j], m.u[j], m.w[j], m.corner[j], m.columns[j], m.edge[j])
 
 
 @part
@@ -106,7 +118,7 @@ def close_ends(ends, d):
     d[2, 0] = d[2, n]
 
 
-@fill(chain.settle, Slaved)
+@fill(do.settle, Slaved)
 def _settle(chain, work, hi, lo):
     d = work.base
     n = hi.shape[1]
@@ -183,13 +195,13 @@ def tensions(chain, d, g):
         to[j] = chain.torsion[j] * theta[j]
 
 
-@fill(chain.frame, Slaved)
+@fill(do.frame, Slaved)
 def _frame(chain, work, move, c):
     moved(chain, work.base, move, work.links, 2)
     frame_of(chain, work.links, c)
 
 
-@fill(chain.gradient, Slaved)
+@fill(do.gradient, Slaved)
 def _gradient(chain, work, move, g):
     moved(chain, work.base, move, work.links, 3)
     tensions(chain, work.links, work.tension)
@@ -199,18 +211,19 @@ def _gradient(chain, work, move, g):
             to[i] = x[i] - x[i + 1]
 
 
-@fill(chain.pullback, Slaved)
-def _pullback(chain, work, move, c, g):
+@fill(do.pullback, Slaved)
+def _pullback(chain, work, state, t, move, c, p, g):
     moved(chain, work.base, move, work.links, 3)
     tensions(chain, work.links, work.tension)
     x, y, z = work.tension
     cx, cy, ct, to = c[0], c[1], c[2], g[0]
     for i in range(to.size):
         to[i] = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (z[i] - z[i + 1])
+    do.push(chain.load, state, t, move, c, p, -1.0, g)
 
 
-@fill(chain.sweep, Slaved)
-def _sweep(chain, work, h, pi, p, move, first):
+@fill(do.sweep, Slaved)
+def _sweep(chain, work, state, t, h, p, move, first):
     n = p.shape[1]
     c, q, b, m = work.c, p[0], work.rhs[0], work.matrix
     moved(chain, work.base, move, work.links, 2)
@@ -227,11 +240,15 @@ def _sweep(chain, work, h, pi, p, move, first):
     tensions(chain, work.links, work.tension)
     x, y, z = work.tension
     cx, cy, ct = c
-    before = pi[0]
+    before = state.pi[0]
     for i in range(n):
         pull = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (z[i] - z[i + 1])
         b[i] = before[i] - q[i] - half * pull
     assemble(chain, c, 1.0, half * half, m.a, m.u, m.w, m.corner)
+    if do.loaded(chain.load):
+        forward(c, p, work.step, half)
+        do.push(chain.load, state, t + half, work.step, c, p, half, work.rhs)
+    do.guide(chain.load, c, half, half * half, m.a, m.a)
     factor(chain, m)
     solve(chain, m, b)
     for i in range(n):
@@ -239,27 +256,28 @@ def _sweep(chain, work, h, pi, p, move, first):
     return renew(c, p, half, move, chain.scale, b)
 
 
-@fill(chain.stiffness, Slaved)
+@fill(do.stiffness, Slaved)
 def _stiffness(chain, work, move, c, matrix):
     assemble(chain, c, 0.0, 1.0, matrix.a, matrix.u, matrix.w, matrix.corner)
 
 
-@fill(chain.precondition, Slaved)
-def _precondition(chain, stiff, g, matrix):
+@fill(do.precondition, Slaved)
+def _precondition(chain, stiff, c, d, g, matrix):
     for i in range(stiff.a.size):
         matrix.a[i] = 1 + g * stiff.a[i]
         matrix.u[i] = g * stiff.u[i]
         matrix.w[i] = g * stiff.w[i]
     matrix.corner[0], matrix.corner[1] = g * stiff.corner[0], g * stiff.corner[1]
+    do.guide(chain.load, c, d, g, matrix.a, matrix.a)
     factor(chain, matrix)
 
 
-@fill(chain.correct, Slaved)
+@fill(do.correct, Slaved)
 def _correct(chain, matrix, r):
     solve(chain, matrix, r[0])
 
 
-@fill(chain.potential, Slaved)
+@fill(do.potential, Slaved)
 def _potential(chain, work):
     d, n = work.base, chain.radius.size
     total = 0.0
@@ -269,12 +287,12 @@ def _potential(chain, work):
     return 0.5 * total
 
 
-@fill(chain.vanishing, Slaved)
+@fill(do.vanishing, Slaved)
 def _vanishing(chain):
     return chain.unit
 
 
-@fill(chain.lost, Slaved)
+@fill(do.lost, Slaved)
 def _lost(chain, work, slope):
     d, half, worst, disc = work.base, 0.5 / chain.k, LOST_HEADING**2, -1
     if not chain.unit:

@@ -4,14 +4,15 @@ Links are held with one more at each end: link j lies before disc j. Around a ri
 have no stiffness.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs.chain import SteeredChain
-from discs.kernels import chain
+from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
+from discs.kernels.load import UNLOADED
 from discs.kernels.shared import forward, renew
 from discs.kernels.steered_links import pull, pulled, secant, spread, strains, turn
 from discs.kernels.steered_matrix import Matrix, assemble, factor, solve
@@ -31,18 +32,25 @@ class Steered(NamedTuple):
     shift: NDArray
     k: float
     ring: bool
+    load: Any
 
 
 def parameters(
-    given: SteeredChain, weights: NDArray, roots: NDArray, scale: NDArray, shift: NDArray, stiffness: NDArray
+    given: SteeredChain,
+    weights: NDArray,
+    roots: NDArray,
+    scale: NDArray,
+    shift: NDArray,
+    stiffness: NDArray,
+    load: Any = None,
 ) -> Steered:
-    """The parameters of a chain; `stiffness` is that of its links, (4, n_links)."""
+    """The parameters of a chain and its load; `stiffness` is that of its links, (4, n_links)."""
     ring = given.ends == "ring"
     padded = np.zeros((4, given.n + 1))
     padded[:, 1 : 1 + stiffness.shape[1]] = stiffness
     padded[:, 0] = padded[:, -1]
     paces = np.stack([given.radius / roots[0], 1 / roots[0], 1 / roots[1]])
-    return Steered(weights, paces, padded, scale, shift, given.k, ring)
+    return Steered(weights, paces, padded, scale, shift, given.k, ring, load or UNLOADED)
 
 
 class Work(NamedTuple):
@@ -67,7 +75,7 @@ class Work(NamedTuple):
     matrix: Matrix
 
 
-@fill(chain.workspace, Steered, _nrt=True)
+@fill(do.workspace, Steered, _nrt=True)
 def _workspace(chain):
     n = chain.weights.shape[1]
     base, angles, strain = np.zeros((4, n + 1)), np.zeros((4, n + 1)), np.zeros((4, n + 1))
@@ -78,15 +86,19 @@ def _workspace(chain):
     return Work(base, angles, strain, links, turned, along, tension, across, couple, c, step, rhs, matrix)
 
 
-@fill(chain.factors, Steered, _nrt=True)
-def _factors(chain, g):
-    n, kind = chain.weights.shape[1], np.array([g])
-    return Matrix(
-        np.empty((3, n), kind.dtype), np.empty((4, n), kind.dtype), np.empty((2, 2, n), kind.dtype), np.empty(11, kind.dtype)
-    )
+@fill(do.factors, Steered, _nrt=True)
+def _factors(chain, g, count):
+    n, kind = chain.weights.shape[1], np.array([g]).dtype
+    d, o, columns = np.empty((count, 3, n), kind), np.empty((count, 4, n), kind), np.empty((count, 2, 2, n), kind)
+    return Matrix(d, o, columns, np.empty((count, 11), kind))
 
 
-@fill(chain.settle, Steered)
+@fill(do.pick, Steered)
+def _pick(chain, m, j):
+    return Matrix(m.d[j], m.o[j], m.columns[j], m.edge[j])
+
+
+@fill(do.settle, Steered)
 def _settle(chain, work, hi, lo):
     n = hi.shape[1]
     for row in range(4):
@@ -127,12 +139,12 @@ def frame_of(chain, work, dphi, c):
         ct[i], cp[i] = roll[i], heading[i]
 
 
-@fill(chain.frame, Steered)
+@fill(do.frame, Steered)
 def _frame(chain, work, move, c):
     frame_of(chain, work, move[3], c)
 
 
-@fill(chain.gradient, Steered)
+@fill(do.gradient, Steered)
 def _gradient(chain, work, move, g):
     pull(chain, work, move, False)
     for row in range(4):
@@ -144,17 +156,18 @@ def _gradient(chain, work, move, g):
         to[i] += couple[i] + couple[i + 1]
 
 
-@fill(chain.pullback, Steered)
-def _pullback(chain, work, move, c, g):
+@fill(do.pullback, Steered)
+def _pullback(chain, work, state, t, move, c, p, g):
     pull(chain, work, move, False)
     pulled(work, c, g)
+    do.push(chain.load, state, t, move, c, p, -1.0, g)
 
 
-@fill(chain.sweep, Steered)
-def _sweep(chain, work, h, pi, p, move, first):
+@fill(do.sweep, Steered)
+def _sweep(chain, work, state, t, h, p, move, first):
     n = p.shape[1]
     half = 0.5 * h
-    c, b, m = work.c, work.rhs, work.matrix
+    c, b, m, pi = work.c, work.rhs, work.matrix, state.pi
     frame_of(chain, work, move[3], c)
     forward(c, p, work.step, half)
     pull(chain, work, work.step, True)
@@ -162,8 +175,10 @@ def _sweep(chain, work, h, pi, p, move, first):
     for row in range(2):
         for i in range(n):
             b[row, i] = pi[row, i] - p[row, i] - half * b[row, i]
+    do.push(chain.load, state, t + half, work.step, c, p, half, b)
     if first:  # later sweeps of a step make do with its matrix, see `discs.integrators.midpoint`
         assemble(chain, work, c, 1.0, half * half, m.d, m.o)
+        do.guide(chain.load, c, half, half * half, m.d[0], m.d[2])
         factor(chain, m)
     solve(chain, m, b)
     for row in range(2):
@@ -172,30 +187,31 @@ def _sweep(chain, work, h, pi, p, move, first):
     return renew(c, p, half, move, chain.scale, b[0])
 
 
-@fill(chain.stiffness, Steered)
+@fill(do.stiffness, Steered)
 def _stiffness(chain, work, move, c, matrix):
     spread(chain, work, move, 0, work.couple.size)
     secant(work, 0, work.couple.size, chain.k, False)
     assemble(chain, work, c, 0.0, 1.0, matrix.d, matrix.o)
 
 
-@fill(chain.precondition, Steered)
-def _precondition(chain, stiff, g, matrix):
+@fill(do.precondition, Steered)
+def _precondition(chain, stiff, c, d, g, matrix):
     n = stiff.d.shape[1]
     for i in range(n):
         matrix.d[0, i], matrix.d[1, i], matrix.d[2, i] = 1 + g * stiff.d[0, i], g * stiff.d[1, i], 1 + g * stiff.d[2, i]
     for row in range(4):
         for i in range(n):
             matrix.o[row, i] = g * stiff.o[row, i]
+    do.guide(chain.load, c, d, g, matrix.d[0], matrix.d[2])
     factor(chain, matrix)
 
 
-@fill(chain.correct, Steered)
+@fill(do.correct, Steered)
 def _correct(chain, matrix, r):
     solve(chain, matrix, r)
 
 
-@fill(chain.potential, Steered)
+@fill(do.potential, Steered)
 def _potential(chain, work):
     total = 0.0
     for row in range(4):
@@ -204,11 +220,11 @@ def _potential(chain, work):
     return 0.5 * total
 
 
-@fill(chain.vanishing, Steered)
+@fill(do.vanishing, Steered)
 def _vanishing(chain):
     return False
 
 
-@fill(chain.lost, Steered)
+@fill(do.lost, Steered)
 def _lost(chain, work, slope):
     return -1

@@ -13,7 +13,7 @@ from compare.peers.peer import Cutoff, Outcome, Peer
 from compare.precision import Row, WorkPrecision, distance, reference
 from continuum import untwisting_rod
 from discs import Problem
-from discs.kernels import methods
+from discs.kernels import driver
 from tests.conftest import Model, uneven
 
 # a short motion: peers whose error is that of their tolerances come close
@@ -122,7 +122,7 @@ def test_times_at_equal_error():
 def scipy_alone(problem: Problem) -> list[Peer]:
     """SciPy's methods with the kernel that every chain shares, where peers have one compiled for theirs, which takes seconds."""
     chain = problem.system.kernel
-    return reduced.scipy_peers(problem, reduced.Bound(problem, lambda t, y, out: methods.reduced(chain, y, out)))
+    return reduced.scipy_peers(problem, reduced.Bound(problem, lambda t, y, out: driver.reduced(chain, t, y, out)))
 
 
 def test_a_run_over_its_time_is_cut_off():

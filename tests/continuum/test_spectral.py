@@ -16,7 +16,7 @@ from continuum.spectral import bent_hint
 from discs import Gauss6, SimulationError
 from discs.integrators.base import Work
 from discs.integrators.gauss import tableau
-from discs.system import Phase
+from discs.skew import Phase
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
 POSITIONS = ("x", "y", "theta")

@@ -189,7 +189,7 @@ def test_leapfrog_is_the_paper_s_scheme():
         for p in ("spin_inertia", "torsion_stiffness", "density", "bending_stiffness", "radius")
     )
     memory = Leapfrog().begin(system, problem.start(), h, Work())
-    memory = Leapfrog().advance(system, memory, h, Work())
+    memory = Leapfrog().advance(system, memory, 0.0, h, Work())
     (x0, y0, t0), (x, y, t), (x2, y2, t2) = memory.hi - memory.last, memory.hi, memory.hi + memory.next
     inner = slice(2, -2)  # where the printed stencils reach
 

@@ -8,7 +8,6 @@ import sys
 import time
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
@@ -100,7 +99,7 @@ def dense_banded(a, u, w, corner):
 
 @pytest.mark.parametrize("kind", [float, complex])
 def test_pentadiagonal_elimination(kind):
-    @numba.njit
+    @compiled.jit
     def solve(a, u, w, corner, b, pair):
         banded.factor(a, u, w, corner)
         banded.substitute(a, u, w, corner, b)
@@ -124,7 +123,7 @@ def test_pentadiagonal_elimination(kind):
 
 @pytest.mark.parametrize("kind", [float, complex])
 def test_block_tridiagonal_elimination(kind):
-    @numba.njit
+    @compiled.jit
     def solve(d, o, b):
         blocks.factor(d, o)
         blocks.substitute(d, o, b)
@@ -148,7 +147,7 @@ def test_block_tridiagonal_elimination(kind):
 
 
 def test_sines_and_cosines():
-    @numba.njit
+    @compiled.jit
     def all_of(x, cos, sin):
         for i in range(x.size):
             cos[i], sin[i] = steered_links.turn(x[i])
@@ -185,17 +184,19 @@ def test_more_discs_than_doubles_can_hold_are_warned_of():
 class Loading(Midpoint):
     """A midpoint method that takes as long as kernels that are read from a slow disc."""
 
-    def kernel(self, *arguments):
+    @property
+    def parameters(self):
         time.sleep(0.3)
-        return super().kernel(*arguments)
+        return super().parameters
 
 
 class Compiling(Midpoint):
     """A midpoint method that must be compiled."""
 
-    def kernel(self, *arguments):
-        numba.njit(lambda x: np.sort(x) + x[::-1].sum())(np.ones(3))
-        return super().kernel(*arguments)
+    @property
+    def parameters(self):
+        compiled.jit(lambda x: np.sort(x) + x[::-1].sum())(np.ones(3))
+        return super().parameters
 
 
 @pytest.mark.parametrize("progress", [True, False])
@@ -226,7 +227,8 @@ NO_CACHE = """
 import warnings
 with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("always")
-    from discs.kernels import tiny  # line 5
+    from discs.kernels import tiny
+    tiny.twice(1)  # line 6
 print([(w.filename, w.lineno, str(w.message)[:31]) for w in told], tiny.twice(21), tiny.thrice(14))
 """
 
@@ -247,7 +249,7 @@ def test_without_a_folder_for_the_cache(folder, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     kept = folder == "cache"
-    told = [] if kept else [("<string>", 5, "compiled kernels cannot be kept")]
+    told = [] if kept else [("<string>", 6, "compiled kernels cannot be kept")]
     assert done.stdout.strip() == f"{told} 42 42"
     assert bool(list(tmp_path.glob("cache/kernels-*/**/*.nbc"))) == kept
     assert not list((tmp_path / "empty").iterdir())
@@ -315,9 +317,13 @@ def test_importing_does_not_compile():
 
 
 def test_compiled_kernels_are_kept_by_all_that_they_may_call(tmp_path):
-    kept = compiled._cache.__wrapped__
-    (tmp_path / "rod.py").write_text("one = 1")
-    before = kept(tmp_path)
-    assert before == kept(tmp_path) != kept(Path(compiled.__file__).parent)
-    (tmp_path / "rod.py").write_text("one = 2")
-    assert kept(tmp_path) != before
+    kept, rod = compiled._cache.__wrapped__, tmp_path / "rod.py"
+    rod.write_text("one = 1")
+    before = kept((rod,))
+    assert before == kept((rod,)) != kept((Path(compiled.__file__),))
+    rod.write_text("one = 2")
+    assert kept((rod,)) != before
+    (tmp_path / "__init__.py").touch()  # in a package, what stands beside it may be called too
+    before = kept((rod,))
+    (tmp_path / "beside.py").write_text("two = 2")
+    assert kept((rod,)) != before

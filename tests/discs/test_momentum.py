@@ -68,11 +68,11 @@ def test_leapfrog_is_its_own_reverse(model):
     memory = method.begin(system, problem.start(), h, work)
     path = [memory.hi + memory.lo]
     for _ in range(50):
-        memory = method.advance(system, memory, h, work)
+        memory = method.advance(system, memory, 0.0, h, work)
         path.append(memory.hi + memory.lo)
     memory = TwoStep(memory.hi, memory.lo, -memory.next, -memory.last)
     for place in path[-2::-1]:
-        memory = method.advance(system, memory, h, work)
+        memory = method.advance(system, memory, 0.0, h, work)
         np.testing.assert_allclose(memory.hi + memory.lo, place, atol=1e-11)
 
 

@@ -7,7 +7,7 @@ from compare import lump
 from continuum import untwisting_rod
 from discs import Midpoint, simulate
 from discs.integrators import Work
-from discs.system import Phase
+from discs.skew import Phase
 
 STEPS = 12
 
@@ -16,7 +16,7 @@ def extended(problem, h):
     """Positions after STEPS converged midpoint steps in `longdouble`, (3, n)."""
     z, method, work = Phase(*(part.astype(np.longdouble) for part in problem.start())), Midpoint(tolerance=1e-16), Work()
     for _ in range(STEPS):
-        z = method.step(problem.system, z, h, work)
+        z = method.step(problem.system, z, 0.0, h, work)
     assert z.hi.dtype == np.longdouble
     assert work.unconverged == 0
     return z.hi + z.lo

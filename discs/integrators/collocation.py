@@ -1,0 +1,185 @@
+"""The compiled step of Gauss collocation; its plain twin is `discs.integrators.gauss`."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.kernels import protocol as do
+from discs.kernels.compiled import CUT, Cost, fill, interrupted, part
+from discs.kernels.shared import add as advance
+from discs.kernels.shared import copy, forward, largest, renew
+from discs.skew import Phase
+
+
+class Collocation(NamedTuple):
+    """`Tableau`, and the limits of the sweeps."""
+
+    a: NDArray
+    b: NDArray
+    nodes: NDArray
+    last: NDArray
+    real: NDArray
+    real_in: NDArray
+    real_out: NDArray
+    pairs: NDArray
+    pairs_in: NDArray
+    pairs_out: NDArray
+    sweeps: int
+    tolerance: float
+
+
+class Room(NamedTuple):
+    """c and move like positions; stages and v (s, rows, n); p, force and rest (s, columns, n); x, z like momenta, z complex; change
+    (n,). stiff, single, double : matrices of the chain; the last two have one for each real eigenvalue and each pair."""
+
+    c: NDArray
+    still: NDArray
+    move: NDArray
+    stages: NDArray
+    v: NDArray
+    p: NDArray
+    force: NDArray
+    rest: NDArray
+    x: NDArray
+    z: NDArray
+    change: NDArray
+    stiff: Any
+    single: Any
+    double: Any
+
+
+@part
+def combine(weights: NDArray, parts: NDArray, h: float, total: NDArray) -> None:
+    """total = h sum_j weights[j] parts[j], (rows, n)."""
+    for row in range(total.shape[0]):
+        to = total[row]
+        a, x = h * weights[0], parts[0, row]
+        for i in range(to.size):
+            to[i] = a * x[i]
+        for j in range(1, weights.size):
+            a, x = h * weights[j], parts[j, row]
+            for i in range(to.size):
+                to[i] += a * x[i]
+
+
+@part
+def transform(weights: NDArray, parts: NDArray, out: NDArray) -> None:
+    """out = sum_j weights[j] parts[j], real or complex, (columns, n)."""
+    for row in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            out[row, i] = weights[0] * parts[0, row, i]
+        for j in range(1, weights.size):
+            for i in range(out.shape[1]):
+                out[row, i] += weights[j] * parts[j, row, i]
+
+
+@part
+def spread(weights: NDArray, z: NDArray, parts: NDArray) -> None:
+    """parts[j] += weights[j] z for real ones; twice the real part of it for complex ones, which stand for themselves and their
+    conjugates."""
+    for j in range(weights.size):
+        for row in range(z.shape[0]):
+            to, x = parts[j, row], z[row]
+            for i in range(to.size):
+                to[i] += (weights[j] * x[i]).real
+
+
+@part
+def reach(c: NDArray, p: NDArray, tau: float, scale: NDArray, change: NDArray) -> float:
+    """The largest entry of tau C p, each row in units of its `scale`."""
+    furthest = 0.0
+    for row in range(c.shape[0]):
+        a, q = c[row], p[row // 3]
+        for i in range(change.size):
+            change[i] = abs(tau * a[i] * q[i])
+        furthest = max(furthest, largest(change) / scale[row])
+    return furthest
+
+
+@fill(do.room, Collocation, _nrt=True)
+def _room(method: Collocation, chain: Any, state: Phase) -> Room:
+    (rows, n), columns, s = state.hi.shape, state.pi.shape[0], method.b.size
+    c, still, move = np.empty((rows, n)), np.zeros((rows, n)), np.empty((rows, n))
+    stages, v = np.empty((s, rows, n)), np.empty((s, rows, n))
+    p, force, rest = np.empty((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n))
+    x, z, change = np.empty((columns, n)), np.empty((columns, n), np.complex128), np.empty(n)
+    stiff, single = do.factors(chain, 1.0, 1), do.factors(chain, 1.0, method.real.size)
+    return Room(c, still, move, stages, v, p, force, rest, x, z, change, stiff, single, do.factors(chain, 1.0j, method.pairs.size))
+
+
+@fill(do.step, Collocation)
+def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
+    c, move, p, force, rest, x, z, stages, v = (
+        room.c,
+        room.move,
+        room.p,
+        room.force,
+        room.rest,
+        room.x,
+        room.z,
+        room.stages,
+        room.v,
+    )
+    a, pi, s, stiff = method.a, before.pi, method.b.size, do.pick(chain, room.stiff, 0)
+    do.frame(chain, work, room.still, c)
+    renew(c, pi, 0.5 * h, move, chain.scale, room.change)
+    do.frame(chain, work, move, c)
+    do.stiffness(chain, work, move, c, stiff)
+    for j in range(method.real.size):
+        do.precondition(chain, stiff, c, h * method.real[j], h * h * method.real[j] ** 2, do.pick(chain, room.single, j))
+    for j in range(method.pairs.size):
+        do.precondition(chain, stiff, c, h * method.pairs[j], h * h * method.pairs[j] ** 2, do.pick(chain, room.double, j))
+    for i in range(s):
+        copy(pi, p[i])
+        forward(c, p[i], v[i])
+    sweep, moved = 0, np.inf
+    while sweep < method.sweeps and not moved <= method.tolerance:
+        if interrupted():
+            return CUT
+        sweep += 1
+        # C where the stages are, velocities by it, and forces where these lead
+        for i in range(s):
+            combine(a[i], v, h, move)
+            do.frame(chain, work, move, stages[i])
+        for i in range(s):
+            forward(stages[i], p[i], v[i])
+        for i in range(s):
+            combine(a[i], v, h, move)
+            do.pullback(chain, work, before, t + method.nodes[i] * h, move, stages[i], p[i], force[i])
+        for i in range(s):
+            combine(a[i], force, -h, rest[i])
+            for row in range(pi.shape[0]):
+                for k in range(pi.shape[1]):
+                    rest[i, row, k] += pi[row, k] - p[i, row, k]
+        # the change of p, eigenvector by eigenvector
+        force[:] = 0.0
+        for j in range(method.real.size):
+            transform(method.real_in[j], rest, x)
+            do.correct(chain, do.pick(chain, room.single, j), x)
+            spread(method.real_out[j], x, force)
+        for j in range(method.pairs.size):
+            transform(method.pairs_in[j], rest, z)
+            do.correct(chain, do.pick(chain, room.double, j), z)
+            spread(method.pairs_out[j], z, force)
+        moved = 0.0
+        for i in range(s):
+            moved = max(moved, reach(c, force[i], 0.5 * h, chain.scale, room.change))
+            for row in range(pi.shape[0]):
+                for k in range(pi.shape[1]):
+                    p[i, row, k] += force[i, row, k]
+            forward(stages[i], p[i], v[i])
+    combine(method.b, v, h, move)
+    advance(before, move, 1.0, after)
+    for row in range(pi.shape[0]):
+        for k in range(pi.shape[1]):
+            start, total = pi[row, k], 0.0
+            for i in range(s):
+                total += method.last[i] * (p[i, row, k] - start)
+            after.pi[row, k] = start + total
+    return s * sweep, sweep * (method.real.size + method.pairs.size), method.tolerance > 0 and sweep == method.sweeps
+
+
+@fill(do.jumps, Collocation)
+def _jumps(method: Collocation) -> bool:
+    return False

@@ -1,0 +1,129 @@
+"""What compiled steps ask of a chain, and the driver of a method: stubs, filled in by the type of their first argument.
+
+`chain` and `method` are NamedTuples of parameters. Arrays: positions and moves (rows, n), momenta (columns, n), one column for roll
+and one for turning where discs have their own heading. `work` is what `workspace` made: arrays that a chain's functions share,
+among them the shape of the base position, from which moves are reckoned.
+"""
+
+from discs.kernels.compiled import stub
+
+
+@stub
+def workspace(chain):
+    """Room to work in."""
+
+
+@stub
+def settle(chain, work, hi, lo):
+    """Take hi + lo as the base position: moves are reckoned from there."""
+
+
+@stub
+def frame(chain, work, move, c):
+    """c = C after a move from the base."""
+
+
+@stub
+def pullback(chain, work, state, t, move, c, p, g):
+    """g = C^T (grad V - f) after a move from the base, the positions of `state`, for the C given; f at the time t and v = C p."""
+
+
+@stub
+def gradient(chain, work, move, g):
+    """g = grad V, (rows, n), after a move from the base."""
+
+
+@stub
+def sweep(chain, work, state, t, h, p, move, first):
+    """One sweep of a midpoint step from `state` at the time t, the first or a later one: p and the half step `move`, in place.
+
+    Returns how far the move changed, in units of its scale."""
+
+
+@stub
+def factors(chain, g, count):
+    """Room for `count` matrices of `precondition`, real or complex as g is."""
+
+
+@stub
+def pick(chain, matrices, j):
+    """One of the matrices of `factors`."""
+
+
+@stub
+def stiffness(chain, work, move, c, matrix):
+    """The real matrix C^T (grad^2 V) C after a move, for the C given; of grad^2 V without what prestress adds."""
+
+
+@stub
+def precondition(chain, stiff, c, d, g, matrix):
+    """Factors of I + d C^T D C + g C^T (grad^2 V) C, `stiff` being that of `stiffness`, D the damping of the chain's load."""
+
+
+@stub
+def correct(chain, matrix, r):
+    """Solve with the factors of `precondition`, r (columns, n) in place."""
+
+
+@stub
+def potential(chain, work):
+    """V at the base position."""
+
+
+@stub
+def vanishing(chain):
+    """Whether a heading can vanish."""
+
+
+@stub
+def lost(chain, work, slope):
+    """A disc whose heading vanishes on the straight way from `slope` (2, n) to the base's, or -1; then `slope` is the base's."""
+
+
+# What the driver asks of a method
+
+
+@stub
+def room(method, chain, state):
+    """Arrays that a method's steps work in, for states of the kind of `state`."""
+
+
+@stub
+def step(method, chain, work, room, before, after, t, h):
+    """A step from `before`, which is the base position and is left as it is, at the time t to `after`; returns its `Cost`."""
+
+
+@stub
+def jumps(method):
+    """Whether stages jump to and fro, as in explicit steps: a heading that vanishes on the way is then told by the velocity."""
+
+
+# What the driver asks of a state, `discs.skew.Phase` or what a method of several steps remembers
+
+
+@stub
+def kinetic(state, chain, h):
+    """Kinetic energy; of what a method of several steps remembers, half a step h later."""
+
+
+@stub
+def rate(state, chain, work, c, tau, move):
+    """move = tau times the velocities at a state, the base position; c is room for C."""
+
+
+# What a chain asks of its load, `chain.load`
+
+
+@stub
+def loaded(load):
+    """Whether there are loads: where not, what they need is left out of the code."""
+
+
+@stub
+def push(load, state, t, move, c, p, factor, g):
+    """g += factor C^T f: loads after a move from the positions of `state`, at the time t and v = C p."""
+
+
+@stub
+def guide(load, c, d, g, roll, turn):
+    """Add d C^T D C + g C^T (stiffness) C, which is diagonal, to roll (n,) and, where discs turn by themselves, to turn (n,)."""

@@ -1,0 +1,33 @@
+"""Several loads at once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.loads.linear import Linear
+from discs.skew import Load
+
+
+@dataclass(frozen=True, eq=False)
+class Total(Load):
+    """The sum of loads."""
+
+    loads: tuple[Load, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("damping", "stiffness"):
+            object.__setattr__(self, name, np.sum([getattr(load, name) for load in self.loads], axis=0))
+
+    def force(self, t: float, q: NDArray, v: NDArray) -> NDArray:
+        return np.sum([load.force(t, q, v) for load in self.loads], axis=0)
+
+
+def total(loads: tuple[Load, ...]) -> Load | None:
+    """One load for all, None for none; linear loads stay linear, which has a compiled form."""
+    if not loads:
+        return None
+    linear = [load for load in loads if isinstance(load, Linear)]
+    if len(linear) == len(loads):
+        return Linear(*(np.sum([getattr(load, name) for load in linear], axis=0) for name in ("constant", "damping", "stiffness")))
+    return loads[0] if len(loads) == 1 else Total(loads)

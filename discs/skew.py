@@ -1,0 +1,164 @@
+r"""The contract between mechanics and integrators: q' = C(q) pi, pi' = -C(q)^T (grad V(q) - f(t, q, q')).
+
+The columns of C span the velocities that the constraints allow, scaled so that C^T M C = 1 for the mass matrix M; pi are the rates
+along them. The constraint holds identically. Without loads f, H = |pi|^2/2 + V(q) is constant because the two factors C are each
+other's transpose. `discs.slaved` and `discs.steered` are chains in this form; the derivations stand there. `continuum.galerkin` is
+the field.
+
+A configuration q is an array (rows, n), one row for each coordinate of a disc. All that V and C need of it is its *shape*: the
+differences between neighbours, and headings where a disc has its own. Shapes are formed from both parts of the positions.
+
+Energy-exact steps need the mean force between two configurations, a discrete gradient D with D . (q_1 - q_0) = V(q_1) - V(q_0). V
+is half a sum of stiffness times strain squared; if the strains' changes are written as s_1 - s_0 = B (q_1 - q_0) with a
+secant matrix B, then D = B^T (stiffness) (s_0 + s_1)/2 is one.
+"""
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Placed(Protocol):
+    """What has positions hi + lo, (rows, n)."""
+
+    @property
+    def hi(self) -> NDArray: ...
+
+    @property
+    def lo(self) -> NDArray: ...
+
+
+class Phase(NamedTuple):
+    """A point of phase space: positions as an unevaluated sum of two doubles, and momenta.
+
+    hi, lo : (rows, n); q = hi + lo with lo below half a unit in the last place of hi.
+    pi : (n,), or (2, n) with own headings, rates along the columns of C.
+    """
+
+    hi: NDArray
+    lo: NDArray
+    pi: NDArray
+
+
+def add(hi: NDArray, lo: NDArray, increment: NDArray) -> tuple[NDArray, NDArray]:
+    """Add an increment to hi + lo without losing its low digits (Knuth's two-sum)."""
+    term = increment + lo
+    total = hi + term
+    part = total - hi
+    return total, (hi - (total - part)) + (term - part)
+
+
+class Load(ABC):
+    """Generalised forces f(t, q, v) that act on the coordinates besides -grad V.
+
+    Attributes
+    ----------
+    damping, stiffness : (rows, n), what f loses for each unit of v and of q, as far as it is linear and acts disc by disc. Implicit
+        steps take these parts into their matrix; the forces themselves are all in `force`.
+    parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
+    """
+
+    damping: Any
+    stiffness: Any
+
+    @abstractmethod
+    def force(self, t: float, q: NDArray, v: NDArray) -> NDArray:
+        """f at a time, of positions and velocities (rows, n), (rows, n)."""
+
+    @property
+    def parameters(self) -> Any:
+        return None
+
+
+class SkewGradient(ABC):
+    """Equations q. = C(q) pi, pi. = -C(q)^T (grad V(q) - f(t, q, q.)): all that integrators need to know.
+
+    Attributes
+    ----------
+    n : number of discs, or of functions that a field is made of.
+    rows : names of the rows of q.
+    scale : (rows,), the size of a motion: a length, and a radian.
+    quadratic : whether V is quadratic, so that secants do not depend on the step.
+    load : f, or None, and then nothing is computed of it.
+    """
+
+    n: int
+    rows: tuple[str, ...]
+    scale: NDArray
+    quadratic: bool
+    load: Load | None = None
+
+    @abstractmethod
+    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Any:
+        """The shape of positions hi + lo: what C and V depend on."""
+
+    @abstractmethod
+    def moved(self, shape: Any, dq: NDArray) -> Any:
+        """The shape after a change dq (rows, n) of the positions."""
+
+    @abstractmethod
+    def frame(self, shape: Any) -> Any:
+        """C, as `forward`, `back` and `solve` take it."""
+
+    @abstractmethod
+    def forward(self, c: Any, p: NDArray) -> NDArray:
+        """C p, (rows, n)."""
+
+    @abstractmethod
+    def back(self, c: Any, g: NDArray) -> NDArray:
+        """C^T g, of the shape of pi."""
+
+    @abstractmethod
+    def potential(self, shape: Any) -> float:
+        """V."""
+
+    @abstractmethod
+    def secant(self, shape: Any, dq: NDArray) -> Any:
+        """What depends on a step dq (rows, n) from a shape: the mean geometry that `mean_force` and `solve` need."""
+
+    @abstractmethod
+    def mean_force(self, secant: Any) -> NDArray:
+        """The discrete gradient of V over the step, (rows, n); grad V if the step is zero."""
+
+    @abstractmethod
+    def solve(self, secant: Any, c: Any, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
+        """Solve (I + d C^T D C + g C^T S C) p = rhs for p, of the shape of pi.
+
+        S = B^T (stiffness) B and the load's stiffness, D its damping.
+        """
+
+    @final
+    def pull(self, c: Any, gradient: NDArray, t: float, z: Phase, move: NDArray | float, p: NDArray) -> NDArray:
+        """C^T (gradient - f), of the shape of pi: minus the rate of pi.
+
+        f is taken at the time t, at the positions of z after a move (rows, n), with velocities C p.
+        """
+        if self.load is None:
+            return self.back(c, gradient)
+        return self.back(c, gradient - self.load.force(t, z.hi + (z.lo + move), self.forward(c, p)))
+
+    def gradient(self, shape: Any) -> NDArray:
+        """grad V, (rows, n)."""
+        return self.mean_force(self.secant(shape, self._no_step))
+
+    @cached_property
+    def _no_step(self) -> NDArray:
+        return np.zeros((len(self.rows), self.n))
+
+    # Several configurations, the stages of a step; here one after the other, a system may take them at once
+
+    def frames(self, shape: Any, moves: NDArray) -> Any:
+        """C after each of `moves` (stages, rows, n)."""
+        return [self.frame(self.moved(shape, move)) for move in moves]
+
+    def forwards(self, frames: Any, p: NDArray) -> NDArray:
+        """C p of each, (stages, rows, n)."""
+        return np.array([self.forward(c, stage) for c, stage in zip(frames, p, strict=True)])
+
+    def pulls(self, frames: Any, shape: Any, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
+        """C^T (grad V - f) at times t (stages,), after each of `moves` from z, of the shape of p."""
+        stages = zip(frames, t, moves, p, strict=True)
+        return np.array([self.pull(c, self.gradient(self.moved(shape, m)), time, z, m, own) for c, time, m, own in stages])

@@ -1,0 +1,140 @@
+"""Loads in the contract: a constant force and a linear damper, on both engines, against other formulations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discs import Chain, Midpoint, Problem, State, simulate
+from discs.integrators import METHODS, Work
+from discs.lagrange import frames as coordinates
+from discs.lagrange import lagrange_dalembert
+from discs.loads import Linear, Load
+from tests.conftest import Model, models, uneven
+
+KINDS = [
+    Model("springs", "field"),
+    Model("consistent", "unit"),
+    Model("ring", "field"),
+    Model("springs", "steered"),
+    Model("ring", "steered"),
+]
+COMPILED = "midpoint", "suzuki4", "gauss6"  # each takes long to compile
+TAKING = {
+    "midpoint": 2e-3,
+    "suzuki4": 2e-5,
+    "gauss6": 1e-6,
+    "rk4": 1e-5,
+    "DOP853": 1e-6,
+}  # largest error at dt = 0.02 or rk4's 0.002
+
+
+def loaded(model: Model, n: int = 7) -> Problem:
+    """An uneven chain, pushed and braked unevenly, held softly in place."""
+    problem = uneven(n, model)
+    rng = np.random.default_rng(5)
+    shape = len(problem.system.rows), n
+    push = Linear(rng.uniform(-0.4, 0.4, shape) * problem.chain.w)
+    brake = Linear(damping=rng.uniform(0.0, 0.8, shape) * problem.chain.w, stiffness=rng.uniform(0.0, 0.3, shape) * problem.chain.w)
+    return replace(problem, loads=(push, brake))
+
+
+@models(KINDS)
+def test_loads_move_discs_as_the_saddle_point_says(model):
+    """Lagrange-d'Alembert with multipliers and the same forces, by DOP853: another formulation, another method."""
+    problem = loaded(model)
+    n, free = problem.chain.n, lagrange_dalembert(problem, dense=True)
+
+    def force(q, v):
+        push = sum(load.force(0.0, q.reshape(-1, n), v.reshape(-1, n)) for load in problem.loads)
+        return free.force(q, v) + push.ravel()
+
+    q, v = coordinates(problem)
+    expected = replace(free, force=force).integrate(q, v, [0.0, 1.0], rtol=1e-9)
+    for name, close in TAKING.items():
+        for engine in (
+            ("compiled", "plain") if name in ("midpoint", "suzuki4", "gauss6") else ("plain",)
+        ):  # each takes long to compile
+            method = METHODS[name](rtol=1e-8, atol=1e-9) if name == "DOP853" else METHODS[name]()
+            run = simulate(problem, method, 0.002 if name == "rk4" else 0.02, 2, ("contact_force",), False, engine)
+            assert run.stats["engine"] == engine
+            found = np.array([getattr(run, row)[-1] for row in problem.system.rows])
+            np.testing.assert_allclose(found, expected.q[-1].reshape(-1, n), rtol=0, atol=close, err_msg=f"{name}, {engine}")
+    np.testing.assert_allclose(run.contact_force[-1], expected.multipliers[-1].reshape(2, n), rtol=0, atol=1e-5)
+
+
+def rolling(damping: float, n: int = 3) -> Problem:
+    """Discs without springs that roll straight on, braked alike."""
+    chain = Chain(
+        n=n, length=2.0, density=1.3, spin_inertia=0.6, torsion_stiffness=0.0, bending_stiffness=0.0, radius=0.7, rolling="unit"
+    )
+    brake = Linear(damping=np.outer([0.0, 0.0, damping], chain.w))
+    return Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, 2.0), 3.0, (brake,))
+
+
+@pytest.mark.parametrize("engine", ["compiled", "plain"])
+def test_a_brake_on_the_axles_lets_rolling_die_down_like_an_exponential(engine):
+    rate = 0.9 / (0.6 + 1.3 * 0.7**2)
+    run = simulate(rolling(0.9), "gauss6", 0.1, 4, progress=False, engine=engine)
+    np.testing.assert_allclose(run.omega, 2.0 * np.exp(-rate * run.t)[:, None] * np.ones(3), rtol=1e-8)
+    np.testing.assert_allclose(run.y, 0.7 * 2.0 * (1 - np.exp(-rate * run.t))[:, None] / rate * np.ones(3), rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["compiled", "plain"])
+def test_a_strong_brake_does_not_limit_the_step(engine):
+    """h times the rate of decay is 1e4: the midpoint rule multiplies by (1 - h a/2)/(1 + h a/2), and no sweep is lacking."""
+    problem = rolling(1e5)
+    run = simulate(problem, Midpoint(tolerance=1e-10), 0.3, 2, progress=False, engine=engine)
+    x = 0.15 * 1e5 / (0.6 + 1.3 * 0.7**2)
+    np.testing.assert_allclose(run.omega[-1], 2.0 * ((1 - x) / (1 + x)) ** 10, rtol=1e-9)
+    assert run.stats["unconverged"] == 0
+
+
+@models(KINDS[:3])
+def test_a_midpoint_step_balances_energy_and_work_to_rounding(model):
+    """H_1 - H_0 = h v_m . f_m with v_m and f_m in the middle of the step, where V is quadratic."""
+    problem = loaded(model)
+    system, z, h = problem.system, problem.start(), 0.05
+    end = Midpoint(tolerance=1e-15).step(system, z, 0.0, h, Work())
+    v = ((end.hi - z.hi) + (end.lo - z.lo)) / h
+    work = h * np.vdot(v, system.load.force(0.5 * h, 0.5 * (z.hi + end.hi), v))
+    before, after = (0.5 * np.vdot(s.pi, s.pi) + system.potential(system.shape(s.hi, s.lo)) for s in (z, end))
+    assert abs(after - before - work) < 1e-13 * before
+    assert abs(work) > 1e-3 * before
+
+
+class Wind(Load):
+    """A user's load, in NumPy: quadratic drag and a push that starts at t = 0.3."""
+
+    def __init__(self, shape):
+        self.damping = self.stiffness = np.zeros(shape)
+
+    def force(self, t, q, v):
+        return -0.2 * np.abs(v) * v + (0.1 if t > 0.3 else 0.0)
+
+
+def test_a_load_without_a_compiled_form_runs_on_the_plain_engine():
+    problem = uneven(5, Model("springs", "unit"))
+    run = simulate(replace(problem, loads=(Wind((3, 5)),)), "rk4", 0.001, 2, progress=False)
+    calm = simulate(problem, "rk4", 0.001, 2, progress=False, engine="plain")
+    assert run.stats["engine"] == "plain"
+    assert abs(run.omega - calm.omega).max() > 1e-3
+    both = replace(problem, loads=(Wind((3, 5)), Linear(np.full((3, 5), 0.05))))
+    assert simulate(both, "rk4", 0.001, 2, progress=False).stats["engine"] == "plain"
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Linear(damping=-np.ones((3, 7))), "damping must be finite and at least 0"),
+        (lambda: Linear(np.full((3, 7), np.nan)), "constant must be finite"),
+        (lambda: Linear(np.ones((3, 7)), damping=np.ones((4, 7))), r"must have one shape, \(rows, discs\); got \(3, 7\), \(4, 7\)"),
+        (lambda: replace(uneven(7, KINDS[0]), loads=(Linear(np.ones((4, 7))),)), r"Linear: .* must have shape \(3, 7\)"),
+        (lambda: replace(uneven(7, KINDS[0]), loads=Linear(np.ones((3, 7)))), "loads must be a tuple of loads"),
+        (lambda: simulate(loaded(KINDS[0]), "leapfrog", 0.001), "'leapfrog' does not take loads; take a method that does"),
+        (lambda: simulate(loaded(KINDS[0]), dt=0.1, frames=1).save("never.nc"), "a run with loads cannot be written to a file"),
+    ],
+)
+def test_bad_loads_are_refused_in_words(make, words):
+    with pytest.raises(ValueError, match=words):
+        make()
