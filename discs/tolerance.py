@@ -279,4 +279,4 @@ def _nudged(problem: Problem) -> Problem:
 
     moved = {name: nudge(np.array(getattr(start, name))) for name in problem.system.rows}
     rates = {"omega": start.omega, "phi_rate": start.phi_rate}
-    return Problem(problem.chain, State(**moved, **rates), problem.duration)
+    return replace(problem, initial=State(**moved, **rates))
