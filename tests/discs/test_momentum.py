@@ -14,6 +14,9 @@ from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 from tests.discs.test_integrators import ADAPTIVE, moved, tight
 from tests.discs.test_textbook import CLOSED, TIMES
 
+# long steps, to be well above rounding
+pytestmark = pytest.mark.filterwarnings("ignore:.* is too long for this motion")
+
 KINDS = [Model("consistent", "field"), Model("ring", "unit"), Model("springs", "true"), Model("springs", "steered")]
 FORCE = ("contact_force", "velocity")
 
