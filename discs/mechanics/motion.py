@@ -242,6 +242,20 @@ def _trajectory(system: "MechanicalSystem", t: NDArray, found: NDArray, charged:
     return Trajectory(t, path, speed, multipliers, energy, residual, charges if charged else None, stats)
 
 
+def _conserving(system: "MechanicalSystem", path: Trajectory) -> bool:
+    """Whether the forces are those of L, which do not change the energy: v.f + d(v.Mv/2 + V)(v) = 0 with v held, at all frames.
+
+    A `force` that a user put in place of that of L may damp or drive.
+    """
+    for q, v in zip(path.q, path.v, strict=True):
+        step = 1e-5 * np.abs(path.q).max() / max(float(np.abs(v).max()), 1e-300)
+        rise = (system.energy(q + step * v, v) - system.energy(q - step * v, v)) / (2 * step)
+        power = float(v @ system.force(q, v))
+        if abs(power + rise) > 1e-3 * (abs(power) + abs(rise)) + 1e-6 * np.abs(path.energy).max() / step * 1e-5:
+            return False
+    return True
+
+
 def _watch(system: "MechanicalSystem", path: Trajectory) -> None:
     """Warn where energy is lost or gained, or a constraint left."""
     method, cure = path.stats["method"], f"the motion may not be trusted; take a smaller rtol than {path.stats['rtol']:g}"
@@ -249,7 +263,7 @@ def _watch(system: "MechanicalSystem", path: Trajectory) -> None:
     off = np.abs(path.energy - path.energy[0])
     rounding = 1e-12 * np.abs(path.energy - kinetic).max()
     f = int(np.argmax(off))
-    if not np.any(system.drive) and off[f] > LOST * kinetic.max() + rounding:
+    if not np.any(system.drive) and off[f] > LOST * kinetic.max() + rounding and _conserving(system, path):
         warn(
             f"{method}: energy is conserved, but at t = {path.t[f]:g} it is {path.energy[f]:.3g} and not {path.energy[0]:.3g}: "
             f"{cure}"

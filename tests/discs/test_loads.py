@@ -80,6 +80,7 @@ def test_a_brake_on_the_axles_lets_rolling_die_down_like_an_exponential(engine):
     np.testing.assert_allclose(run.y, 0.7 * 2.0 * (1 - np.exp(-rate * run.t))[:, None] / rate * np.ones(3), rtol=1e-8, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 @pytest.mark.parametrize("engine", ["compiled", "plain"])
 def test_a_strong_brake_does_not_limit_the_step(engine):
     """h times the rate of decay is 1e4: the midpoint rule multiplies by (1 - h a/2)/(1 + h a/2), and no sweep is lacking."""
