@@ -18,7 +18,7 @@ from discs.recording import Recording, Rows, kept_settings
 from discs.solution import Solution
 from discs.step import suggest_dt
 from discs.tolerance import USUAL, NotReached, some_of, to_tolerance
-from discs.trust import Watch, cure, doubts
+from discs.trust import WARNED, Watch, cure, doubts
 from discs.warn import warn
 
 WANTS = ("velocity", "slope", "contact_force")
@@ -91,7 +91,9 @@ def doubted(problem: Problem, run: Solution) -> str:
     """What to warn of where a run is not to be trusted; empty where it may be."""
     method = run.stats["method"]
     said = lost_energy(problem, method, run.t, run.energy)
-    if reasons := doubts(run.stats):
+    stats = run.stats
+    doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # most runs are not, and a call does little else
+    if doubtful and (reasons := doubts(stats)):
         said += (
             f"{' ' if said else ''}{method}: {'; '.join(reasons)}: the run may not be trusted; take {cure(run.stats)}, or tol=1e-3"
         )
@@ -162,7 +164,7 @@ def _run(
 
     checked : look at the error of the steps. more : what else `stats` tells. estimate : of the error, if it is known.
     """
-    want = _wanted(want, integrator.offers)
+    want = () if want == () else _wanted(want, integrator.offers)
     compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None and integrator.compiles
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
@@ -200,7 +202,8 @@ def _run(
             return record.solution({})
         march = March(problem, integrator, h, compiled, not progress, watch)
         first = record.begin(march, lambda: _observed(march, 0.0, want, bool(offered)))
-        shown.update(march.step)
+        if march.step:
+            shown.update(march.step)
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)
             for taken in march.to(before):
@@ -278,8 +281,6 @@ class Progress:
 
 
 def _wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
-    if want == ():
-        return ()
     if not isinstance(want, Iterable):
         raise ValueError(f"want must be names of quantities; got {checks.shown(want)}")
     given = (want,) if isinstance(want, str) else tuple(want)

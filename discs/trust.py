@@ -78,10 +78,10 @@ class Watch:
         if not self.count:
             return 0.0
         worst = 0.0
-        for off, size in zip(self.total.tolist(), self.size.tolist(), strict=True):
+        for off, size in zip(self.total, self.size, strict=True):
             if off > worst * (size or 1.0):
                 worst = off / (size or 1.0)
-        return SAFETY * (self.steps or 1) / self.count * worst
+        return float(SAFETY * (self.steps or 1) / self.count * worst)
 
 
 def advanced(
