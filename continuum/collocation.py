@@ -27,7 +27,8 @@ def step(
     tolerance : of the positions' last change, in units of `rod.scale`; where so many `sweeps` do not reach it, z and 0 are
         returned.
     """
-    a, b, last, _, _, _, *pairs = tableau(stages)
+    rule = tableau(stages)
+    a, pairs = rule.a, (rule.pairs, rule.pairs_in, rule.pairs_out)
     base = z.hi + z.lo
     p = np.array([z.pi] * stages)
     v = rod.forward(rod.frame(base), p)
@@ -42,7 +43,7 @@ def step(
         moved = rod.forward(c, p) - v
         v = v + moved
         if (np.abs(0.5 * h * moved) <= tolerance * rod.scale[:, None]).all():
-            return Phase(*add(z.hi, z.lo, h * np.tensordot(b, v, 1)), z.pi + last @ (p - z.pi)), v, sweep
+            return Phase(*add(z.hi, z.lo, h * np.tensordot(rule.b, v, 1)), z.pi + rule.last @ (p - z.pi)), v, sweep
         if not np.isfinite(moved).all():
             break
         results = [(v, p, moved), *results[:2]]

@@ -129,7 +129,7 @@ class Steps:
 
         after = Phase(z.hi.copy(), z.lo.copy(), z.pi.copy())
         v = np.empty((self._stages, 3, self.rod.n))
-        taken = step(self.rod.kernel, *after, self._modes, tuple(tableau(self._stages)), h, SWEEPS, self._sweeps, v)
+        taken = step(self.rod.kernel, *after, self._modes, tableau(self._stages), h, SWEEPS, self._sweeps, v)
         return after, v, taken
 
     def _advance(self, t: float, z: Phase) -> tuple[float, Phase]:

@@ -125,7 +125,7 @@ def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v):
 
     Returns the number of sweeps, 0 if they did not converge.
     """
-    a, b, last, _, _, _, pairs, pairs_in, pairs_out = tableau
+    a, b, last, pairs = tableau.a, tableau.b, tableau.last, tableau.pairs
     s, n = b.size, pi.size
     stages, work = blank(rod, s)
     base, v1, weights, scale = np.empty((1, 3, n)), np.empty((1, 3, n)), b.reshape(1, s), tolerance * rod.scale
@@ -156,7 +156,7 @@ def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v):
         for i in range(s):
             for k in range(n):
                 rest[i, 0, k] -= p[i, 0, k]
-        correct(modes, h, pairs, pairs_in, pairs_out, rest.reshape(s, n), parts, modal, change)
+        correct(modes, h, pairs, tableau.pairs_in, tableau.pairs_out, rest.reshape(s, n), parts, modal, change)
         for i in range(s):
             for k in range(n):
                 p[i, 0, k] += change[i, k]

@@ -66,7 +66,7 @@ def followed(scene, n, steps):
     z = Phase(*(part.copy() for part in rod.start))
     for _ in range(steps):
         modes = rod.modes(rod.frame(z.hi + z.lo))
-        assert compiled_step(rod.kernel, *z, modes, tuple(tableau(4)), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)))
+        assert compiled_step(rod.kernel, *z, modes, tableau(4), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)))
     return rod, z
 
 
@@ -117,7 +117,7 @@ def test_twins_agree(name, scene):
         z = Phase(*(part.copy() for part in rod.start))
         plain, v = rod.start, np.empty((stages, 3, 21))
         for _ in range(2):
-            sweeps = compiled_step(rod.kernel, *z, modes, tuple(tableau(stages)), scene.duration / 5, 40, 1e-12, v)
+            sweeps = compiled_step(rod.kernel, *z, modes, tableau(stages), scene.duration / 5, 40, 1e-12, v)
             plain, rates, count = collocation.step(rod, plain, modes, scene.duration / 5, stages, 40, 1e-12)
             assert count == sweeps > 1
             np.testing.assert_allclose(v, rates, atol=1e-9)
