@@ -89,7 +89,7 @@ def balances(
     if frames < 3 or nodes <= DEGREE:
         raise ValueError(f"balances need at least 3 frames and {DEGREE + 1} nodes; got {frames} and {nodes}")
 
-    period, advance = rod.length if closed else None, np.asarray(shift)[:, None, None]
+    period, advance = rod.length if closed else None, np.asarray(shift)[:, None, None] / rod.length
 
     def along(values: NDArray, order: int = 1) -> NDArray:
         return _spline(run.s, values, period).derivative(order)(run.s)
@@ -98,8 +98,9 @@ def balances(
         return np.gradient(values, run.t, axis=-2, edge_order=2)
 
     r, theta1, omega = np.stack([run.x, run.y]), along(run.theta), run.omega
-    r1, r2, r3, r4 = (along(r - advance * run.s / rod.length, order) for order in (1, 2, 3, 4))
-    r1 += advance / rod.length
+    chord = advance * run.s  # what of r is not periodic
+    r1, r2, r3, r4 = (along(r - chord, order) for order in (1, 2, 3, 4))
+    r1 += advance
     rho, alpha, beta, bend = rod.density, rod.spin_inertia, rod.torsion_stiffness, rod.bending_stiffness
     if rolling is None:
         if run.x_rate is None or run.y_rate is None or run.tension is None:
@@ -133,9 +134,11 @@ def balances(
     for name, (move, turn, density, flux) in laws.items():
         slip = np.zeros_like(r) if rolling is None else np.asarray(move) - e * turn
         source = _dot(force, slip)
-        # r x n is not periodic where r advances
-        around = None if name == "angular_momentum" and advance.any() else period
-        unforced = (in_time(density) + _spline(run.s, flux, around).derivative()(run.s))[1:-1]
+        if name == "angular_momentum" and closed:  # r x n is not periodic where r advances
+            flux_s = along(flux + _cross(chord, n)) - _cross(advance, n) - _cross(chord, along(n))
+        else:
+            flux_s = along(flux)
+        unforced = (in_time(density) + flux_s)[1:-1]
         found[name] = Balance(density, flux, source, np.hypot(*slip), unforced - source[1:-1], unforced)
     return found
 

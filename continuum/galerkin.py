@@ -138,30 +138,43 @@ class SpectralRod(SkewGradient):
         return start
 
     def slopes(self, z: Phase) -> NDArray:
-        """r' at the nodes, (n,), as a complex number."""
-        x, y = (z.hi + z.lo)[:2] @ self.basis.bends[: self.n].T
-        return x + 1j * y + self._shift
+        """r' at the nodes, (..., n), as a complex number."""
+        xy = (z.hi + z.lo)[..., :2, :] @ self.basis.bends[: self.n].T
+        return xy[..., 0, :] + 1j * xy[..., 1, :] + self._shift
+
+    def _omega(self, z: Phase) -> NDArray:
+        """omega at the nodes, (..., n); as `frame` has it, without the finer points."""
+        arm = self._radius if self.unit else self._radius * np.abs(self.slopes(z))
+        return z.pi / np.sqrt(self._spin + self._mass * arm**2)
 
     def energy(self, z: Phase) -> float:
         """Kinetic and potential energy."""
-        return 0.5 * float(z.pi @ z.pi) + self.potential(z.hi + z.lo)
+        return float(self.energies(z))
+
+    def energies(self, z: Phase) -> NDArray:
+        """Those of several states at once, by leading axes."""
+        return 0.5 * (z.pi * z.pi).sum(axis=-1) + self._potentials(z.hi + z.lo)
+
+    def _potentials(self, q: NDArray) -> NDArray:
+        return 0.5 * ((q * self.mean_force(q)).sum(axis=(-2, -1)) + q[..., 2, :] @ self.twist) + self._offset
 
     def reader(self, s: NDArray) -> Callable[[Phase], dict[str, NDArray]]:
-        """A function of states that returns x, y, theta, omega at places s (S,), each (S,)."""
+        """A function of states, several at once by leading axes, that returns x, y, theta, omega at places s, each (..., S)."""
         line, field, theta = self.basis.line(s), self.basis.field(s), self._scene.fields(s)["theta"]
 
         def at(z: Phase) -> dict[str, NDArray]:
             q = z.hi + z.lo
-            x, y = line @ q[0] + self._shift.real * s, line @ q[1] + self._shift.imag * s
-            return {"x": x, "y": y, "theta": theta + field @ q[2], "omega": field @ (self.frame(q).t * z.pi)}
+            x, y = q[..., 0, :] @ line.T + self._shift.real * s, q[..., 1, :] @ line.T + self._shift.imag * s
+            return {"x": x, "y": y, "theta": theta + q[..., 2, :] @ field.T, "omega": self._omega(z) @ field.T}
 
         return at
 
-    def slip(self, z: Phase) -> float:
-        """Largest |r. - e omega| at the nodes: what the projection leaves of the constraint."""
+    def slip(self, z: Phase) -> NDArray:
+        """Largest |r. - e omega| at the nodes: what the projection leaves of the constraint; several at once by leading axes."""
         c = self.frame(z.hi + z.lo)
         rates = self.forward(c, z.pi)
-        return float(np.abs(self.line @ (rates[0] + 1j * rates[1]) - c.e * rates[2]).max())
+        moved = (rates[..., 0, :] + 1j * rates[..., 1, :]) @ self.line.T
+        return np.abs(moved - c.e * rates[..., 2, :]).max(axis=-1)
 
     def shape(self, hi: NDArray, lo: NDArray | None = None) -> NDArray:
         return hi if lo is None else hi + lo
@@ -212,7 +225,7 @@ class SpectralRod(SkewGradient):
         return self.back(frames, self.mean_force(shape + moves))
 
     def potential(self, shape: NDArray) -> float:
-        return 0.5 * float(np.vdot(shape, self.mean_force(shape)) + self.twist @ shape[2]) + self._offset
+        return float(self._potentials(shape))
 
     def secant(self, shape: NDArray, dq: NDArray) -> NDArray:
         return shape + 0.5 * dq

@@ -63,14 +63,15 @@ def solve(
         it names instead, rates too: {"omega": 1e-4, "theta": 1e-5}.
     method : "spectral", "richardson" or "leapfrog"; "elements" for headings of their own. The first that fits by default.
     n, dt : points and step of "leapfrog"; the step is below k^2/8 where that would be unstable.
-    frames : number of frames, equally spaced over the duration with both ends, or their times. The spectral field takes a step of
-        its own for each: where only the end counts, frames=2 is several times faster.
+    frames : number of frames, equally spaced over the duration with both ends, or their times. They cost little: those within a
+        step of the spectral field are on its collocation polynomial.
     progress : show progress on anything that takes over a second.
 
     Returns
     -------
     Solution on the nodes `s`, with `error_estimate` of x, y, theta, omega, of phi and phi_rate where sections have them, and of the
-    energy: its largest distance from that of the initial fields, by quadrature, which the motion keeps.
+    energy: its largest distance over all frames from that of the initial fields, by quadrature. The steps of the spectral field
+    keep the energy to rounding (and what sweeps leave); at frames within steps it is that of the fields shown, and off like them.
 
     Raises
     ------

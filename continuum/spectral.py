@@ -10,7 +10,7 @@ The finer motion errs too. With a ratio p of its error to that of the coarser on
 the estimate is d/(1 - p): p from the last two differences, at least 1/3, and 1/2 where there is only one (4/5 where initial fields
 are narrow, as functions that do not hold them change little). (The corner s = 0, t = 0,
 where the initial twist breaks a condition of the ends, leaves waves of wave number q and size q^-6 or less in theta: errors fall
-like a power in the end, of the steps like their third.)
+like a power in the end, of the steps like their third; of omega, whose waves have the size q^-4, like their square.)
 """
 
 from collections.abc import Mapping
@@ -27,6 +27,7 @@ from continuum.initial import resolve
 from continuum.rod import Scene
 from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
 from discs import SimulationError, Solution
+from discs.skew import Phase
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
 NODES = 1025  # of a solution, so many that splines through them do for derivatives too; more where initial fields are narrow
@@ -37,6 +38,7 @@ FIRST, LOOSEST = 0.5, 2e-4  # the tolerance of a step in the first motion: so mu
 FAR = 100.0  # times the tolerance: errors above that are not yet for shorter steps to mend
 SLOW = 1 / 3  # of the last error: one above that falls slowly
 LEAST, UNKNOWN, MOST = 1 / 3, 0.5, 0.8  # what a finer motion errs by, over the error of the coarser one
+RATE = 0.5  # the least of that for omega
 SAME = 0.05  # of the time: two motions that end so near to each other end there
 BENT = 1e-3  # curvature times the length at a free end, from which on a line is said to start bent there
 
@@ -44,12 +46,15 @@ BENT = 1e-3  # curvature times the length at a free end, from which on a line is
 class Motion(NamedTuple):
     """A motion on n functions.
 
-    fields : (F, S) by name, with energy and slip (F,).
+    rod, states : the functions, and the states at the times, some at once.
+    fields : (F, S) by name.
     start : largest error of the fields at the start, (S,), by name.
     tolerance : of a step. steps : their number.
     """
 
-    fields: dict[str, Any]
+    rod: SpectralRod
+    states: list[Phase]
+    fields: dict[str, NDArray]
     start: dict[str, float]
     n: int
     tolerance: float
@@ -88,14 +93,12 @@ class Course:
         steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._compiled)
         at, initial = rod.reader(self.s), self._scene.fields(self.s)
         begun = at(rod.start)
-        rows: dict[str, list] = {}
-        for z in steps.at(self._times):
-            for name, value in (at(z) | {"energy": rod.energy(z), "rolling_residual": rod.slip(z)}).items():
-                rows.setdefault(name, []).append(value)
+        states = list(steps.at(self._times))
+        fields = at(Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True))))
         if steps.lengths:
             self._first = steps.lengths[0]
         start = {name: float(np.abs(begun[name] - initial[name]).max()) for name in FIELDS}
-        return Motion({name: np.array(values) for name, values in rows.items()}, start, n, tolerance, len(steps.lengths))
+        return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths))
 
 
 def distances(a: dict[str, NDArray], b: dict[str, NDArray]) -> dict[str, float]:
@@ -184,7 +187,8 @@ class Search:
         before, self._change = self._change, over(change, self._bound)
         first = MOST if self.course.narrow else UNKNOWN
         ratio = float(np.clip(self._change / before, LEAST, MOST)) if np.isfinite(before) else first
-        self.estimate = {name: max(error / (1 - ratio), coarse.start[name]) for name, error in change.items()}
+        ratios = {name: max(ratio, RATE) if name == "omega" else ratio for name in FIELDS}
+        self.estimate = {name: max(error / (1 - ratios[name]), coarse.start[name]) for name, error in change.items()}
         if over(self.estimate, self._bound) > 1:
             return False
         if fine.tolerance >= coarse.tolerance:  # both err alike by their steps
@@ -216,4 +220,6 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: NDArray, pro
         "dt": scene.duration / max(found.steps, 1),
         "steps": found.steps,
     }
-    return Solution(t=times, s=search.course.s, error_estimate=estimate, stats=stats, **found.fields)
+    energy, slip = (np.concatenate([f(z) for z in found.states]) for f in (found.rod.energies, found.rod.slip))
+    fields: dict[str, Any] = found.fields | {"energy": energy, "rolling_residual": slip}
+    return Solution(t=times, s=search.course.s, error_estimate=estimate, stats=stats, **fields)

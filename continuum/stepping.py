@@ -3,8 +3,9 @@
 The collocation polynomial of a step with s stages is of degree s in time. The size of its highest Legendre coefficient at the
 nodes, in x, y and theta, is taken as the step's error, and its length chosen so that this is the tolerance (per step; what it makes
 of the whole motion is measured by `continuum.spectral`). That bounds the polynomial and not only its end, which is more accurate
-where the motion is smooth; waves that a step does not resolve spoil the ends too. A step that does not converge, or takes many
-sweeps, makes the next one shorter.
+where the motion is smooth; waves that a step does not resolve spoil the ends too. So states within a step are those of the
+polynomials (`collocation.within`) and cost no step of their own; Gauss steps keep the energy from end to end, not within. A step that
+does not converge, or takes many sweeps, makes the next one shorter.
 
 Long steps must not jump over the end of a motion: under the unit law a heading is lost where z = r' vanishes, at a point or, when a
 ring collapses, everywhere. A step in which Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at a node, or where z is nearest to zero on the
@@ -33,6 +34,7 @@ MODES = 0.4  # sweeps that new modes cost, times stages over functions
 ACCEPTED = 2.0  # times the tolerance
 SHORTEST = 1e-9  # of the duration
 MOST_STEPS = 2**14
+TOGETHER = 256  # states that are formed at once
 
 
 def stages_for(tol: float) -> int:
@@ -88,52 +90,50 @@ class Steps:
         self.lengths: list[float] = []
 
     def at(self, times: NDArray) -> Iterator[Phase]:
-        """The states at times (F,), increasing; those between two steps by a shorter step of its own."""
+        """The states at times (F,), increasing, some at once: arrays have one more axis before their own."""
         t, z = 0.0, self.rod.start
-        before = t, z
-        for time in times.tolist():
-            while t < time:
-                before = t, z
-                t, z = self._advance(t, z)
-            if t == time:
-                yield z
-            else:
-                kept = self._modes, self._usual, self._excess
-                shown, _, taken = self._step(before[1], time - before[0])
-                self._modes, self._usual, self._excess = kept  # frames leave the motion as it is
-                if not taken:
-                    raise self._too_fast(before[0])
-                yield shown
+        while times.size:
+            if times[0] <= t:
+                yield Phase(z.hi[None], z.lo[None], z.pi[None])
+                times = times[1:]
+                continue
+            before, start = t, z
+            t, z, v, p = self._advance(t, z)
+            inside = times[times < t]
+            for some in np.split(inside, range(TOGETHER, inside.size, TOGETHER)):
+                if some.size:
+                    yield collocation.within(start, t - before, v, p, (some - before) / (t - before))
+            times = times[inside.size :]
 
-    def _step(self, z: Phase, h: float) -> tuple[Phase, NDArray, int]:
+    def _step(self, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
         """As `collocation.step`: with the modes of an earlier step as long as they save more than they cost."""
         fresh = self._modes is None or self._excess > MODES * self.rod.n / self._stages
         while True:
             if fresh:
                 c = self.rod.frame(z.hi + z.lo)
                 self._modes = self.rod.modes(self.rod.frame(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi)))
-            after, v, taken = self._sweep(z, h)
+            after, v, p, taken = self._sweep(z, h)
             if fresh:
                 self._usual, self._excess = taken, 0
             else:
                 self._excess += max(taken - self._usual, 0)
             if taken or fresh:
-                return after, v, taken
+                return after, v, p, taken
             fresh = True
 
-    def _sweep(self, z: Phase, h: float) -> tuple[Phase, NDArray, int]:
+    def _sweep(self, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
         assert self._modes is not None
         if not self._compiled:
             return collocation.step(self.rod, z, self._modes, h, self._stages, SWEEPS, self._sweeps)
         from continuum.kernels.collocation import step
 
         after = Phase(z.hi.copy(), z.lo.copy(), z.pi.copy())
-        v = np.empty((self._stages, 3, self.rod.n))
-        taken = step(self.rod.kernel, *after, self._modes, tableau(self._stages), h, SWEEPS, self._sweeps, v)
-        return after, v, taken
+        v, p = np.empty((self._stages, 3, self.rod.n)), np.empty((self._stages, self.rod.n))
+        taken = step(self.rod.kernel, *after, self._modes, tableau(self._stages), h, SWEEPS, self._sweeps, v, p)
+        return after, v, p, taken
 
-    def _advance(self, t: float, z: Phase) -> tuple[float, Phase]:
-        """One step from z at t that converges and is within the tolerance."""
+    def _advance(self, t: float, z: Phase) -> tuple[float, Phase, NDArray, NDArray]:
+        """One step from z at t that converges and is within the tolerance, and the rates and momenta of its stages."""
         slopes = self._slopes(z)
         while True:
             left = self._duration - t
@@ -145,7 +145,7 @@ class Steps:
                 )
             if h < SHORTEST * self._duration:
                 raise self._too_fast(t)
-            after, v, taken = self._step(z, h)
+            after, v, p, taken = self._step(z, h)
             if not taken or self._turned(slopes, after):
                 self._check_heading(slopes, t)
                 self._next = h / 2
@@ -157,7 +157,7 @@ class Steps:
                 continue
             self._next = h * min(1.8, max(0.5, growth)) * min(max(FEW_SWEEPS / taken, 0.6), 1.0)
             self.lengths.append(h)
-            return (self._duration if h == left else t + h), after
+            return (self._duration if h == left else t + h), after, v, p
 
     def _turned(self, slopes: NDArray, after: Phase) -> bool:
         """Whether a heading may have been lost within a step, from slopes (n,) before it."""

@@ -116,12 +116,12 @@ def mixing(count, residuals, factors):
 
 
 @kernel
-def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v):
+def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v, momentum):
     """A step from hi + lo (3, n) and pi (n,), in place if it converges; the plain twin is `continuum.collocation.step`.
 
     modes : `continuum.galerkin.Modes`, of a configuration not far away.
     tableau : of `discs.integrators.gauss`, with an even number of stages s.
-    v : (s, 3, n), the rates of the stages, on return.
+    v, momentum : (s, 3, n) and (s, n), the rates and momenta of the stages, on return.
 
     Returns the number of sweeps, 0 if they did not converge.
     """
@@ -130,10 +130,10 @@ def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v):
     stages, work = blank(rod, s)
     base, v1, weights, scale = np.empty((1, 3, n)), np.empty((1, 3, n)), b.reshape(1, s), tolerance * rod.scale
     q, moves = np.empty((s, 3, n)), np.empty((s, 3, n))
-    p, pull, change, rest = np.empty((s, 1, n)), np.empty((s, 1, n)), np.empty((s, n)), np.empty((s, 1, n))
+    p, pull, change, rest = momentum.reshape(s, 1, n), np.empty((s, 1, n)), np.empty((s, n)), np.empty((s, 1, n))
     parts, modal = np.empty((2 * pairs.size, n)), np.empty((2 * pairs.size, n))
     rates, momenta, residuals, factors = np.zeros((3, s, 3, n)), np.zeros((3, s, 1, n)), np.zeros((3, s, 3, n)), np.zeros(3)
-    start, momentum = pi.reshape(1, 1, n), p.reshape(s, n)
+    start = pi.reshape(1, 1, n)
     settle(hi, lo, base)
     for i in range(s):
         for k in range(n):

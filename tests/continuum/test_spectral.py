@@ -66,7 +66,9 @@ def followed(scene, n, steps):
     z = Phase(*(part.copy() for part in rod.start))
     for _ in range(steps):
         modes = rod.modes(rod.frame(z.hi + z.lo))
-        assert compiled_step(rod.kernel, *z, modes, tableau(4), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)))
+        assert compiled_step(
+            rod.kernel, *z, modes, tableau(4), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)), np.empty((4, n))
+        )
     return rod, z
 
 
@@ -103,7 +105,7 @@ def test_skew_gradient_and_energy(name, scene):
 
     begun, work, method = rod.energy(z), Work(), Gauss6(tolerance=1e-12)
     for _ in range(20):
-        z = method.step(rod, z, scene.duration / 20, work)
+        z = method.step(rod, z, 0.0, scene.duration / 20, work)
     assert rod.energy(z) == pytest.approx(begun, rel=1e-11)
     assert work.unconverged == 0
 
@@ -115,12 +117,18 @@ def test_twins_agree(name, scene):
     modes = rod.modes(rod.frame(rod.start.hi))
     for stages in (4, 6):
         z = Phase(*(part.copy() for part in rod.start))
-        plain, v = rod.start, np.empty((stages, 3, 21))
+        plain, v, p = rod.start, np.empty((stages, 3, 21)), np.empty((stages, 21))
         for _ in range(2):
-            sweeps = compiled_step(rod.kernel, *z, modes, tableau(stages), scene.duration / 5, 40, 1e-12, v)
-            plain, rates, count = collocation.step(rod, plain, modes, scene.duration / 5, stages, 40, 1e-12)
+            sweeps = compiled_step(rod.kernel, *z, modes, tableau(stages), scene.duration / 5, 40, 1e-12, v, p)
+            begun = plain
+            plain, rates, momenta, count = collocation.step(rod, plain, modes, scene.duration / 5, stages, 40, 1e-12)
             assert count == sweeps > 1
             np.testing.assert_allclose(v, rates, atol=1e-9)
+            np.testing.assert_allclose(p, momenta, atol=1e-12)
+            ends = collocation.within(begun, scene.duration / 5, v, p, np.array([0.0, 1.0]))
+            for i, z_end in enumerate((begun, plain)):
+                np.testing.assert_allclose((ends.hi + ends.lo)[i], z_end.hi + z_end.lo, atol=1e-11)
+                np.testing.assert_allclose(ends.pi[i], z_end.pi, atol=1e-11)
         np.testing.assert_allclose(z.hi + z.lo, plain.hi + plain.lo, atol=1e-11)
         np.testing.assert_allclose(z.pi, plain.pi, atol=1e-12)
 

@@ -9,6 +9,7 @@ from continuum.spectral import Course
 from continuum.stepping import Steps, stages_for
 from discs import SimulationError
 from discs.kernels import limits
+from discs.skew import Phase
 
 
 def largest(a, b):
@@ -23,16 +24,53 @@ def test_a_motion_errs_by_about_the_tolerance_of_its_steps(rolling, tolerance):
     assert 0.03 * tolerance < error < 20 * tolerance
 
 
-def test_frames_do_not_change_the_motion():
-    scene = untwisting_rod()
-    rod = SpectralRod(scene, 27)
+def test_frames_do_not_change_the_motion(monkeypatch):
+    """Nor cost steps: those within one are states of its polynomials. Energy is exact at ends of steps."""
+    taken = []
+    monkeypatch.setattr(Steps, "_sweep", lambda self, z, h, sweep=Steps._sweep: taken.append(h) or sweep(self, z, h))
+    monkeypatch.setattr(stepping, "TOGETHER", 3)
+    rod = SpectralRod(untwisting_rod(), 27)
     few, many = (Steps(rod, 4.5, 1e-4, 4, 0.3) for _ in range(2))
     (end,) = few.at(np.array([4.5]))
-    states = list(many.at(np.linspace(0, 4.5, 31)))
+    alone = len(taken)
+    times = np.linspace(0, 4.5, 101)
+    states = Phase(*(np.concatenate(parts) for parts in zip(*many.at(times), strict=True)))
     assert few.lengths == many.lengths
-    np.testing.assert_array_equal(states[0].hi, rod.start.hi)
-    np.testing.assert_array_equal(states[-1].hi, end.hi)
-    np.testing.assert_allclose([rod.energy(z) for z in states], np.pi**4 / 80, rtol=1e-6)
+    assert len(taken) == 2 * alone
+    np.testing.assert_array_equal(states.hi[0], rod.start.hi)
+    np.testing.assert_array_equal(states.hi[-1], end.hi[0])
+    assert states.hi.shape == (101, 3, 27)
+    drift = np.abs(rod.energies(states) / (np.pi**4 / 80) - 1)
+    assert drift[[0, -1]].max() < 1e-8
+    assert 1e-8 < drift.max() < 1e-4  # of the order of the steps' tolerance
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_frames_within_steps_are_as_accurate_as_ends(rolling, tolerance):
+    """Positions and omega at frames within steps and at the steps' ends, against far smaller steps."""
+    scene, stages = untwisting_rod(rolling), stages_for(3 * tolerance)
+    steps = Steps(SpectralRod(scene, 27), scene.duration, tolerance, stages, scene.duration / 16)
+    list(steps.at(np.array([scene.duration])))
+    ends = np.cumsum(steps.lengths)[:-1]
+    middles = np.concatenate([(ends[1:] + ends[:-1]) / 2, 0.1 * ends[1:] + 0.9 * ends[:-1], 0.8 * ends[1:] + 0.2 * ends[:-1]])
+    errors = []
+    for times in (ends, np.sort(middles)):
+        a, b = (Course(scene, times, *rest[:1]).run(27, rest[1]).fields for rest in ((stages, tolerance), (12, 1e-4 * tolerance)))
+        errors.append((largest(a, b), np.abs(a["omega"] - b["omega"]).max()))
+    assert errors[1][0] < 2 * errors[0][0] < 40 * tolerance
+    assert errors[1][1] < 2 * errors[0][1]
+
+
+def test_the_estimate_covers_all_frames(rolling):
+    """Largest errors of every field over 101 frames against 97 functions in small steps."""
+    times = np.linspace(0, 4.5, 101)
+    truth = Course(untwisting_rod(rolling), times, 12).run(71, 1e-10).fields
+    for tol in (1e-3, 1e-4, 1e-5, 1e-6):
+        field = solve(untwisting_rod(rolling), tol, progress=False)
+        for name, value in truth.items():
+            error = np.abs(getattr(field, name) - value).max()
+            assert error < field.error_estimate[name] < 5 * error, (tol, name)
+        assert np.abs(field.energy - np.pi**4 / 80).max() == pytest.approx(field.error_estimate["energy"], rel=0.1)
 
 
 def test_both_engines_agree(rolling):
@@ -93,7 +131,8 @@ def test_headings_are_lost_at_the_discs_threshold():
     states = Steps(rod, 30.0, 1e-5, 6, 2.0).at(np.linspace(0.7, 0.9, 4001))
     seen: list[float] = []
     with pytest.raises(SimulationError, match="lost its heading"):
-        seen.extend(np.abs(rod.slopes(z)).min() for z in states)
+        for some in states:
+            seen.extend(np.abs(rod.slopes(some)).min(axis=-1))
     assert 0 < seen[-1] < 2 * limits.LOST_HEADING
     assert min(seen[:-10]) > limits.LOST_HEADING
 
