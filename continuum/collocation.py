@@ -6,8 +6,8 @@ when the rates of all stages are settled, not only the momenta. And sweeps are m
 SIAM J. Numer. Anal. 49, 2011): the next guess is that combination of the last three results, with factors of sum one, whose changes
 add up to the least. Sweeps then converge for longer steps, in half their number and less.
 
-Within a step the motion is that of the collocation polynomials, of degree s in time for s stages: with the rates v_j and momenta p_j
-of the stages at c_j, and Lagrange's polynomials l_j through all c, L_j through 0 and all c,
+Within a step the motion is that of the collocation polynomials, of degree s in time for s stages: with rates v_j and momenta p_j of
+the stages at c_j, and Lagrange's polynomials l_j through all c, L_j through 0 and all c,
 
     q(t + tau h) = q + h sum_j v_j int_0^tau l_j,   pi(t + tau h) = pi + sum_j (p_j - pi) L_j(tau),
 

@@ -4,8 +4,8 @@ The collocation polynomial of a step with s stages is of degree s in time. The s
 nodes, in x, y and theta, is taken as the step's error, and its length chosen so that this is the tolerance (per step; what it makes
 of the whole motion is measured by `continuum.spectral`). That bounds the polynomial and not only its end, which is more accurate
 where the motion is smooth; waves that a step does not resolve spoil the ends too. So states within a step are those of the
-polynomials (`collocation.within`) and cost no step of their own; Gauss steps keep the energy from end to end, not within. A step that
-does not converge, or takes many sweeps, makes the next one shorter.
+polynomials (`collocation.within`) and cost no step of their own; Gauss steps keep the energy from end to end, not within. A step
+that does not converge, or takes many sweeps, makes the next one shorter.
 
 Long steps must not jump over the end of a motion: under the unit law a heading is lost where z = r' vanishes, at a point or, when a
 ring collapses, everywhere. A step in which Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at a node, or where z is nearest to zero on the
