@@ -33,14 +33,34 @@ SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a ser
 NODES = 1025  # of a solution, so many that splines through them do for derivatives too; more where initial fields are narrow
 MOST_NODES = 8192
 FIRST_FACTOR = 2.0
-MORE = (3e-4, 3e-6, 3e-8)  # tolerances below which the search begins one size further
-FIRST, LOOSEST = 0.5, 2e-4  # the tolerance of a step in the first motion: so much of that of the fields, at most this
+LOOSEST = 2e-4  # tolerance of a step
 FAR = 100.0  # times the tolerance: errors above that are not yet for shorter steps to mend
-SLOW = 1 / 3  # of the last error: one above that falls slowly
-LEAST, UNKNOWN, MOST = 1 / 3, 0.5, 0.8  # what a finer motion errs by, over the error of the coarser one
+LEAST, MOST = 1 / 3, 0.8  # what a finer motion errs by, over the error of the coarser one
 RATE = 0.5  # the least of that for omega
 SAME = 0.05  # of the time: two motions that end so near to each other end there
 BENT = 1e-3  # curvature times the length at a free end, from which on a line is said to start bent there
+
+
+class Plan(NamedTuple):
+    """How functions and steps are searched for.
+
+    more : tolerances of the fields below which the search begins one size further.
+    first : the tolerance of a step in the first motion, over that of the fields. finer : how often it falls.
+    slow : of the last error; one above that falls slowly.
+    unknown : what the second motion is thought to err by, over the error of the first.
+    """
+
+    more: tuple[float, ...]
+    first: float
+    finer: int
+    slow: float
+    unknown: float
+
+
+PLAN = Plan(more=(3e-4, 3e-6, 3e-8), first=0.5, finer=2, slow=1 / 3, unknown=0.5)
+# short waves of narrow fields fill the rod: errors of the functions fall like n^-2.7, and a step passes many waves
+NARROW = Plan(more=(0.5, 2e-2, 3e-3, 3e-4, 3e-5, 2e-5), first=0.3, finer=1, slow=0.6, unknown=0.8)
+NARROW_STAGES = 12
 
 
 class Motion(NamedTuple):
@@ -73,7 +93,6 @@ class Course:
     Attributes
     ----------
     s : (S,), where fields are given.
-    narrow : whether initial fields have features narrower than a 20th of the length.
     """
 
     def __init__(self, scene: Scene, times: NDArray, stages: int, compiled: bool = True) -> None:
@@ -85,7 +104,6 @@ class Course:
             nodes *= 2
         self.s = length / nodes * np.arange(nodes + (not scene.closed))
         self._density = Density.of(initial)
-        self.narrow = bool(initial.features)
         self._first = scene.duration / 16  # step to begin with
 
     def run(self, n: int, tolerance: float) -> Motion:
@@ -138,19 +156,24 @@ class Search:
 
     def __init__(self, scene: Scene, bound: Mapping[str, float], times: NDArray, bar: tqdm) -> None:
         self._bound, self._bar = bound, bar
-        self.course = Course(scene, times, stages_for(min(bound.values())))
+        tol = min(bound.values())
+        narrow = bool(resolve(scene).features)
+        self._plan = NARROW if narrow else PLAN
+        self.course = Course(scene, times, NARROW_STAGES if narrow else stages_for(tol))
         self.estimate = dict.fromkeys(FIELDS, np.inf)
         self._change = np.inf  # of the last two motions, over its bound
 
     def result(self) -> Motion:
         """A motion within the bounds."""
         tol = min(self._bound.values())
-        start = sum(tol < below for below in MORE)
+        start = sum(tol < below for below in self._plan.more)
         sizes = SIZES[min(start, len(SIZES) - 2) :]
-        tolerance = min(FIRST * tol, LOOSEST)
+        tolerance = min(self._plan.first * tol, LOOSEST)
         stages = self.course.stages
-        finest = finer(finer(tolerance, stages), stages)
-        last, failure, blameless = None, None, 0.0
+        finest = tolerance
+        for _ in range(self._plan.finer):
+            finest = finer(finest, stages)
+        last, failure = None, None
         for n, fewer in zip(sizes, (sizes[0], *sizes), strict=False):
             try:
                 found = self._run(n, tolerance)
@@ -158,10 +181,10 @@ class Search:
                     before = self._change
                     if self._reached(last, found):
                         return last
-                    if SLOW * before < self._change < FAR and blameless < SLOW * self._change:
+                    if self._plan.slow * before < self._change < FAR:
                         shorter = self._run(n, found.tolerance / float(np.clip(2 * self._change, 4.0, 30.0)))
                         by_steps = over(distances(found.fields, shorter.fields), self._bound)
-                        if by_steps > SLOW * self._change:  # shorter steps then, and functions as before
+                        if by_steps > self._plan.slow * self._change:  # shorter steps then, and functions as before
                             last, found = self._run(fewer, coarser(shorter.tolerance, stages)), shorter
                             if self._reached(last, found):
                                 return last
@@ -185,8 +208,7 @@ class Search:
         """Whether the coarser motion is within the bounds."""
         change = distances(coarse.fields, fine.fields)
         before, self._change = self._change, over(change, self._bound)
-        first = MOST if self.course.narrow else UNKNOWN
-        ratio = float(np.clip(self._change / before, LEAST, MOST)) if np.isfinite(before) else first
+        ratio = float(np.clip(self._change / before, LEAST, MOST)) if np.isfinite(before) else self._plan.unknown
         ratios = {name: max(ratio, RATE) if name == "omega" else ratio for name in FIELDS}
         self.estimate = {name: max(error / (1 - ratios[name]), coarse.start[name]) for name, error in change.items()}
         if over(self.estimate, self._bound) > 1:

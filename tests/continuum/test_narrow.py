@@ -26,15 +26,17 @@ def bump(width, place=2.13):
     return lambda s: np.exp(-(((s - place) / width) ** 2))
 
 
-def test_a_bump_between_the_nodes_is_not_missed():
-    """The energy, and theta at t = 1 from a discretisation without a density, 243 functions, off by 2e-6."""
-    field = solve(scene(theta=bump(0.03)), 1e-3, frames=2, progress=False)
+@pytest.mark.parametrize(("tol", "functions"), [(1e-3, 71), (1e-4, 135)])
+def test_a_bump_between_the_nodes_is_not_missed(tol, functions):
+    """The energy, and theta at t = 1 from a discretisation of another density, 243 functions, off by 6e-6."""
+    field = solve(scene(theta=bump(0.03)), tol, frames=2, progress=False)
     theta = CubicSpline(field.s, field.theta[-1])
     limit = field.error_estimate["theta"]
-    assert limit < 1e-3
+    assert limit < tol
     assert abs(theta(2.13) - 1.000585) < limit
     assert abs(theta(0.0) + 0.009521) < limit
     np.testing.assert_allclose(field.energy, 0.4 * np.sqrt(np.pi / 2) / 0.03, rtol=1e-6)
+    assert field.stats["functions"] <= functions
 
 
 @pytest.mark.parametrize(
@@ -77,7 +79,9 @@ def test_a_density_follows_the_data():
     places = [place for place, _, _ in bumps.centres]
     np.testing.assert_allclose(places, [1.0, 3.0], atol=0.02)
     s = np.linspace(0, 4, 401)
-    assert bumps.rate(s)[100] > 8 * bumps.rate(s)[200]
+    height = bumps.centres[0][2]
+    assert height > 7
+    assert bumps.rate(s)[100] > 0.7 * (1 + height) * bumps.rate(s)[200]  # the ends crowd less, and the middle more, for the sine
     np.testing.assert_allclose(np.gradient(bumps.coordinate(s), s)[5:-5], bumps.rate(s)[5:-5], rtol=0.2)
     np.testing.assert_allclose(bumps.coordinate(bumps.place(np.linspace(-1, 1, 99))), np.linspace(-1, 1, 99), atol=1e-13)
     for plain in (
