@@ -76,9 +76,10 @@ class March:
         self.stuck: list[tuple[Any, float, int]] = []
         self.system, self.work, self.step = problem.system, Work(), 0
         self.kernel = self.system.kernel if compiled else None
-        self.twin = integrator if self.kernel is not None and isinstance(integrator, FixedStep) else None  # steps compiled
-        self.explicit = bool(np.isfinite(integrator.stability_limit))
-        self.chunk = max(1, CHUNK // self.system.n)
+        fixed: Any = None if integrator.adaptive else integrator
+        self.twin: FixedStep | None = fixed if self.kernel is not None else None  # steps compiled
+        self.explicit = integrator.stability_limit < np.inf
+        self.chunk = CHUNK // self.system.n or 1
         self.bound = problem.blown_up
         if problem.ill_posed:
             warn(problem.ill_posed)
@@ -204,7 +205,7 @@ class March:
         if frame.seen is not None:
             q, energy, slip = frame.seen
         elif self.kernel is not None:
-            from discs.kernels import driver
+            import discs.kernels.driver as driver
 
             q = np.empty_like(frame.hi)
             energy, slip = driver.observe(self.kernel, frame.hi, frame.lo, frame.rate, q)

@@ -53,7 +53,9 @@ class Rows:
     def write(self, f: int, found: dict[str, Any]) -> None:
         """Take frame f."""
         if not self.rows:
-            self.rows = {name: np.empty((self.times.size, *getattr(value, "shape", ()))) for name, value in found.items()}
+            for name, value in found.items():
+                shape = value.shape if type(value) is np.ndarray else ()
+                self.rows[name] = np.empty((self.times.size, *shape))
         for name, value in found.items():
             self.rows[name][f] = value
 

@@ -281,6 +281,8 @@ class Progress:
 
 
 def _wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
+    if want == ():
+        return ()
     if not isinstance(want, Iterable):
         raise ValueError(f"want must be names of quantities; got {checks.shown(want)}")
     given = (want,) if isinstance(want, str) else tuple(want)

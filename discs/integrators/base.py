@@ -155,17 +155,14 @@ class FixedStep(Integrator):
         Stops after a step whose kinetic energy is not below `bound`, and after one in which a disc loses its heading; the returned
         state is then undefined. Raises `Cut` on Ctrl-C, heard in every sweep, where Python's handler of it does not raise itself.
         """
-        from discs.kernels import driver
+        import discs.kernels.driver as driver
 
-        kind, n = type(memory), memory.hi.shape[1]
-        before = kind(*(array.reshape(-1, n).copy() for array in memory))
-        after = kind(*(np.empty_like(array) for array in before))
-        tally = Tally(*driver.march(self.parameters, chain, before, after, t, h, steps, bound))
+        state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta of roll alone are one row there
+        tally = Tally(*driver.march(self.parameters, chain, state, t, h, steps, bound))
         if tally.steps < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut
-        last = after if tally.steps % 2 else before
-        return kind(*(array.reshape(was.shape) for array, was in zip(last, memory, strict=True))), tally
+        return state if memory[-1].ndim == 2 else Phase(state.hi, state.lo, state.pi[0]), tally
 
 
 class OneStep(FixedStep):
@@ -188,7 +185,7 @@ class OneStep(FixedStep):
         if chain is None:
             z = self.step(system, memory, t, tau, work) if tau else memory
             return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
-        from discs.kernels import driver
+        import discs.kernels.driver as driver
 
         z, lost = memory, -1
         if tau:
@@ -196,7 +193,7 @@ class OneStep(FixedStep):
             work.add(tally)
             lost = tally.lost
         rate, q = np.empty_like(z.hi), np.empty_like(z.hi)
-        energy, slip = driver.look(chain, z._replace(pi=z.pi.reshape(-1, z.hi.shape[1])), rate, q)
+        energy, slip = driver.look(chain, z if z.pi.ndim == 2 else Phase(z.hi, z.lo, z.pi[None]), rate, q)
         return Frame(z.hi, z.lo, rate, lost, (q, energy, slip))
 
     @final

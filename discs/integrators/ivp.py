@@ -41,7 +41,7 @@ class Reduced:
     def __call__(self, t: float, y: NDArray) -> NDArray:
         """The rate of y."""
         if self.chain is not None:
-            from discs.kernels import driver
+            import discs.kernels.driver as driver
 
             out = np.empty_like(y)
             driver.reduced(self.chain, t, np.ascontiguousarray(y), out)

@@ -148,6 +148,19 @@ def _jumps(method: Central) -> bool:
     return False  # its moves are its velocities
 
 
+@fill(do.like, TwoStep, _nrt=True)
+def _like(state: TwoStep) -> TwoStep:
+    return TwoStep(np.empty_like(state.hi), np.empty_like(state.lo), np.empty_like(state.last), np.empty_like(state.next))
+
+
+@fill(do.take, TwoStep)
+def _take(state: TwoStep, to: TwoStep) -> None:
+    copy(state.hi, to.hi)
+    copy(state.lo, to.lo)
+    copy(state.last, to.last)
+    copy(state.next, to.next)
+
+
 @fill(do.kinetic, TwoStep)
 def _kinetic(state: TwoStep, chain: Any, h: float) -> float:
     total = 0.0

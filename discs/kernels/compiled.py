@@ -107,15 +107,18 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """A function called from Python, whose arguments that are NamedTuples, of a chain or of a method, tell what it calls; compiled
     at its first call with each."""
 
+    known: dict[tuple[type, ...], Callable[..., Any]] = {}
+
     @wraps(function)
     def call(*arguments: Any) -> Any:
-        kinds: list[Any] = [type(argument) for argument in arguments if type(argument) in _FILES]
-        return compiled(function, *kinds)(*arguments)
+        kinds = tuple(map(type, arguments))
+        if kinds not in known:
+            known[kinds] = compiled(function, *(kind for kind in kinds if kind in _FILES))
+        return known[kinds](*arguments)
 
     return call
 
 
-@cache
 def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
     """A kernel for these kinds of parameters, as numba has it."""
     import numba

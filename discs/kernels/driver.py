@@ -12,15 +12,15 @@ from discs.skew import Phase
 
 
 @kernel
-def march(method, chain, before, after, t, h, steps, bound):
-    """`steps` steps from the state `before` at the time t; both states are overwritten by turns.
+def march(method, chain, state, t, h, steps, bound):
+    """`steps` steps from a state at the time t, in place.
 
-    Returns (taken, gradients, solves, unconverged, lost); `before` holds the last state after an even number of steps, `after`
-    after an odd one. It stops after a step whose kinetic energy is not below `bound`, and after one in which disc `lost` >= 0 loses
-    its heading: on the straight way that it went or, if the step did not converge or is explicit, on the way that its velocity
-    pointed. The returned state is then undefined, as it is where `taken` is -1: Ctrl-C was pressed.
+    Returns (taken, gradients, solves, unconverged, lost). It stops after a step whose kinetic energy is not below `bound`, and
+    after one in which disc `lost` >= 0 loses its heading: on the straight way that it went or, if the step did not converge or is
+    explicit, on the way that its velocity pointed. The state is then undefined, as it is where `taken` is -1: Ctrl-C was pressed.
     """
-    work, room = do.workspace(chain), do.room(method, chain, before)
+    work, room = do.workspace(chain), do.room(method, chain, state)
+    before, after = state, do.like(state)
     rows, n = before.hi.shape
     half, c, slope = np.empty((rows, n)), np.empty((rows, n)), np.zeros((2, n))
     gradients, solves, unconverged, lost = 0, 0, 0, -1
@@ -43,7 +43,10 @@ def march(method, chain, before, after, t, h, steps, bound):
         lost = do.lost(chain, work, slope)
         before, after = after, before
         if lost >= 0 or not do.kinetic(before, chain, h) <= bound:
-            return step + 1, gradients, solves, unconverged, lost
+            steps = step + 1
+            break
+    if steps % 2:
+        do.take(before, state)
     return steps, gradients, solves, unconverged, lost
 
 

@@ -102,6 +102,16 @@ def jumps(method):
 
 
 @stub
+def like(state):
+    """Room for another state."""
+
+
+@stub
+def take(state, to):
+    """to = state."""
+
+
+@stub
 def kinetic(state, chain, h):
     """Kinetic energy; of what a method of several steps remembers, half a step h later."""
 

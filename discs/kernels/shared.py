@@ -3,6 +3,8 @@
 c, v : (rows, n). p : (1, n), or (2, n) with own headings.
 """
 
+import numpy as np
+
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.skew import Phase
@@ -80,6 +82,18 @@ def square(a, b):
     for i in range(a.size):
         total += a[i] * b[i] * b[i]
     return total
+
+
+@fill(do.like, Phase, _nrt=True)
+def _like(state):
+    return Phase(np.empty_like(state.hi), np.empty_like(state.lo), np.empty_like(state.pi))
+
+
+@fill(do.take, Phase)
+def _take(state, to):
+    copy(state.hi, to.hi)
+    copy(state.lo, to.lo)
+    copy(state.pi, to.pi)
 
 
 @fill(do.kinetic, Phase, fastmath={"contract", "reassoc"})
