@@ -69,6 +69,7 @@ class SpectralRod(SkewGradient):
     ----------
     unit, closed : whether rolling is by the unit law, and whether the rod is closed.
     twist : (n,), the moment f of the initial twist.
+    crossing : the time that a wave of the rod's length takes along it, over 2 pi.
     start : the initial state.
     """
 
@@ -86,6 +87,8 @@ class SpectralRod(SkewGradient):
             np.ascontiguousarray(matrix.T) for matrix in (self.basis.rates, self.basis.bends, self.basis.project)
         )
         self._mass, self._spin = self.basis.w * rod.density, self.basis.w * rod.spin_inertia
+        stiffness = rod.torsion_stiffness * rod.length**2 + rod.bending_stiffness * rod.radius**2
+        self.crossing = rod.length**2 * np.sqrt(rod.inertia / stiffness) if stiffness else np.inf
         self._shift = complex(*scene.shift) / rod.length  # of a closed rod's line; z is the slope of the rest plus this
         self.twist, self._offset = np.zeros(n), 0.0
         self.start = self._start(resolve(scene))

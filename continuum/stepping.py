@@ -32,8 +32,10 @@ SWEEPS = 40
 FEW_SWEEPS = 18  # steps that take more are made shorter
 MODES = 0.4  # sweeps that new modes cost, times stages over functions
 ACCEPTED = 2.0  # times the tolerance
-SHORTEST = 1e-9  # of the duration
+SHORTEST = 1e-9  # of the duration, or of the time that waves take along the rod
+LONGEST = 1e3  # of that time: a first step
 MOST_STEPS = 2**14
+FORETOLD, LONGER = 256, 1.5  # every so many steps: whether those that are left, by the last half of them, are so much too many
 TOGETHER = 256  # states that are formed at once
 
 
@@ -84,7 +86,7 @@ class Steps:
         self._sweeps = sweeps(tolerance)
         nodes, _ = legendre.leggauss(self._stages)
         self._series = np.linalg.inv(legendre.legvander(nodes, self._stages - 1))[-2:]  # of the rates of the stages
-        self._next = first
+        self._next = min(first, LONGEST * rod.crossing)
         self._modes: Modes | None = None
         self._usual, self._excess = 0, 0  # sweeps of a step with its own modes; how many more it took since
         self.lengths: list[float] = []
@@ -138,12 +140,8 @@ class Steps:
         while True:
             left = self._duration - t
             h = left if self._next >= 0.9999 * left else min(self._next, left / 2)
-            if len(self.lengths) >= MOST_STEPS:
-                raise ValueError(
-                    f"tol is not reached in {MOST_STEPS} time steps: the motion is too sensitive or too fast; "
-                    "ask for a larger tol or a shorter duration"
-                )
-            if h < SHORTEST * self._duration:
+            self._check_number(t)
+            if h < SHORTEST * min(self._duration, self.rod.crossing):
                 raise self._too_fast(t)
             after, v, p, taken = self._step(z, h)
             if not taken or self._turned(slopes, after):
@@ -185,6 +183,20 @@ class Steps:
         if self.rod.unit and not least[node] > LOST_HEADING:
             message = "the rod lost its heading: r' = 0, and rolling='unit' has no direction there"
             raise SimulationError(message, len(self.lengths), t, node)
+
+    def _check_number(self, t: float) -> None:
+        """Raise ValueError where steps are too many, or will be."""
+        taken, last = len(self.lengths), self.lengths[-FORETOLD // 2 :]
+        enough = MOST_STEPS - taken
+        foretold = taken and taken % FORETOLD == 0
+        if enough > 0 and not (foretold and self._duration - t > LONGER * enough * np.mean(last)):
+            return
+        needed = taken + (self._duration - t) / np.mean(last)
+        raise ValueError(
+            f"tol is not reached in {MOST_STEPS} time steps: at t = {t:.3g} they are {np.mean(last):.2g} long, so {needed:.2g} "
+            "would be needed; the motion is too long for this tol, or too sensitive or too fast: ask for a larger tol or a "
+            f"shorter duration, well below {t + max(enough, 0) * np.mean(last):.2g}"
+        )
 
     def _too_fast(self, t: float) -> TooFast:
         return TooFast("steps do not converge, however short: the motion is too fast for them", len(self.lengths), t, 0)

@@ -136,6 +136,16 @@ def test_headings_are_lost_at_the_discs_threshold():
     assert min(seen[:-10]) > limits.LOST_HEADING
 
 
+@pytest.mark.parametrize("duration", [1e5, 1e9, 1e300])
+def test_a_motion_that_is_too_long_is_named_soon(rolling, duration, monkeypatch):
+    """From the length of the first steps, not after all that are allowed; the first one may have to be far shorter than it."""
+    taken = []
+    monkeypatch.setattr(Steps, "_sweep", lambda self, z, h, sweep=Steps._sweep: taken.append(h) or sweep(self, z, h))
+    with pytest.raises(ValueError, match=r"would be needed; the motion is too long for this tol.*shorter duration, well below \d"):
+        solve(untwisting_rod(rolling, duration=duration), 1e-3, frames=2, progress=False)
+    assert len(taken) < 400
+
+
 def test_a_motion_that_is_too_fast_is_named():
     """Another omega at every node: no step is short enough."""
 
