@@ -1,9 +1,9 @@
 """N discs converge to the rod: lumping, N -> infinity, pictures."""
 
+from compare.hardcases.table import Stability, stability
 from compare.lump import lump
 from compare.main_job import overview
 from compare.precision import WorkPrecision, work_precision
-from compare.stability_table import Stability, stability
 from compare.study import Study, convergence
 from compare.sweeps import sweep
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from compare import precision, report
 from compare.background import background
+from compare.hardcases.table import Stability, kept, stability
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
-from compare.stability_table import Stability, kept, stability
 from compare.sweeps import read
 from compare.trust import Trust, gathered, trust
 from continuum import steered_rod, untwisting_rod

@@ -12,15 +12,16 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import NDArray
 
 from continuum import Scene
-from discs import Solution, poses
-from discs import figures as of_discs
-from discs.figures import given_or_new
-from discs.style import BLUE, GREEN, GREY, LABEL, ORANGE, PURPLE
+from discs import Solution
+from discs.pictures import figures as of_discs
+from discs.pictures import geometry
+from discs.pictures.figures import given_or_new
+from discs.pictures.style import BLUE, GREEN, GREY, LABEL, ORANGE, PURPLE
 
 if TYPE_CHECKING:
-    from compare.hard_problems import Growth
+    from compare.hardcases.problems import Growth
+    from compare.hardcases.table import Stability
     from compare.precision import WorkPrecision
-    from compare.stability_table import Stability
     from compare.study import Study
 
 KIND = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
@@ -73,7 +74,7 @@ def motion(run: Solution, scene: Scene, arrows: int = 24, instants: int = 5) -> 
 
     The last panel shows all of them from above.
     """
-    columns, frames = 3, poses.instants(run, instants)
+    columns, frames = 3, geometry.instants(run, instants)
     rows = -(-(len(frames) + 1) // columns)
     figure = Figure(figsize=(4.0 * columns, 3.4 * rows), layout="constrained")
     lines = [np.stack([run.x[f], run.y[f]]) for f in frames]
@@ -81,7 +82,7 @@ def motion(run: Solution, scene: Scene, arrows: int = 24, instants: int = 5) -> 
         lines = [np.append(line, line[:, :1] + np.array(scene.shift)[:, None], axis=1) for line in lines]
     everything = np.concatenate(lines, axis=1)
     middle, reach = everything.mean(axis=1), np.ptp(everything, axis=1).max() / 2 * 1.1
-    shown, sideways = poses.picked(run.s, arrows), poses.turn(poses.axles(run))
+    shown, sideways = geometry.picked(run.s, arrows), geometry.turn(geometry.axles(run))
     for panel, (f, (x, y)) in enumerate(zip(frames, lines, strict=True), 1):
         ax: Axes3D = figure.add_subplot(rows, columns, panel, projection="3d")
         sine, cosine = np.sin(run.theta[f]), np.cos(run.theta[f])
@@ -106,7 +107,7 @@ def laws(runs: dict[str, Solution], distance: NDArray, instants: int = 5) -> lis
     left.set_xlabel("time t")
     left.set_ylabel("largest distance (length, rad)")
     left.legend()
-    frames = poses.instants(a, instants)
+    frames = geometry.instants(a, instants)
     for f, shade in zip(frames, np.linspace(0.25, 1, frames.size), strict=True):
         for run, law, colour, line in ((a, first, ORANGE, "-"), (b, second, BLUE, "--")):
             right.plot(run.x[f], run.y[f], line, color=colour, alpha=shade, label=f"{law} law" if shade == 1 else None)

@@ -22,15 +22,16 @@ from tqdm import tqdm
 
 from compare import figures
 from compare.background import background
+from compare.hardcases.table import stability
 from compare.main_job import INSTANTS, LONG, energy_runs
 from compare.outputs import fresh_files
 from compare.peers import reduced
 from compare.peers.reduced import Peer
 from compare.precision import work_precision
-from compare.stability_table import stability
 from compare.study import Study, convergence
 from continuum import Scene, solve, untwisting_rod
-from discs import Problem, Solution, checks, poses
+from discs import Problem, Solution, checks
+from discs.pictures import geometry
 
 SIZES = (17, 33, 65, 129, 257)
 FRAMES = 97  # of the fields, among them the instants of their pictures
@@ -181,7 +182,7 @@ def _motion(page: Page, scenes: dict[str, Scene], fields: dict[str, Solution]) -
         error = max(run.error_estimate[f] for f in ("x", "y", "theta")) if run.error_estimate else np.nan
         rows = [
             (t, s, run.x[f, i], run.y[f, i], run.theta[f, i])
-            for f, t in ((f, run.t[f]) for f in poses.instants(run, INSTANTS))
+            for f, t in ((f, run.t[f]) for f in geometry.instants(run, INSTANTS))
             for i, s in enumerate(run.s)
             if i % max(1, run.s.size // 128) == 0
         ]

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from discs import files
+from discs.files import safe
 
 
 class Result(NamedTuple):
@@ -42,7 +42,7 @@ def read(archive: str | Path) -> list[Result]:
     """
     if not os.path.lexists(archive):
         return []
-    with open(files.opened(archive), "rb") as file:
+    with open(safe.opened(archive), "rb") as file:
         content = file.read()
     return _parsed(archive, content)[1] if content else []
 
@@ -81,9 +81,9 @@ class Archive:
         try:
             if not os.path.lexists(self._path) or not self._path.stat().st_size:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                with files.fresh(self._path) as new:  # never half a first line
+                with safe.fresh(self._path) as new:  # never half a first line
                     new.write(f"{json.dumps(self._of)}\n".encode())
-            self._fd = files.opened(self._path, os.O_RDWR)
+            self._fd = safe.opened(self._path, os.O_RDWR)
         except (OSError, ValueError) as error:
             raise ValueError(f"archive must be a file that can be written; {self._path} is not: {error}") from None
         try:
@@ -94,7 +94,7 @@ class Archive:
         return self
 
     def _take(self, path: Path) -> None:
-        if not files.lock(self._fd):
+        if not safe.lock(self._fd):
             raise ValueError(f"archive {path} is being written by another sweep: wait for its end, or take another file")
         with open(os.dup(self._fd), "rb") as file:
             of, self.found, whole = _parsed(path, file.read())
@@ -113,12 +113,12 @@ class Archive:
     def write(self, line: str) -> None:
         """Append a line."""
         if self._path:
-            files.write_all(self._fd, f"{line}\n".encode())
+            safe.write_all(self._fd, f"{line}\n".encode())
             os.fsync(self._fd)
 
     def __exit__(self, *error: object) -> None:
         if self._path:
-            files.release(self._fd)
+            safe.release(self._fd)
 
 
 def _plain(value: Any) -> Any:

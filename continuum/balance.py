@@ -38,7 +38,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from continuum.rod import Rod, SteeredRod
 from discs import Solution, checks
-from discs.chain import ROLLING
+from discs.chains.chain import ROLLING
 
 DEGREE = 7
 LAWS = ("energy", "momentum_x", "momentum_y", "theta_momentum", "angular_momentum", "material_momentum")

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from continuum.rod import Rod, SteeredRod
 from discs import checks
-from discs.chain import ROLLING
+from discs.chains.chain import ROLLING
 
 
 class Symbols(NamedTuple):

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from continuum.dispersion import frequency, growth, symbols
 from continuum.rod import Rod
 from discs import checks
-from discs.chain import ROLLING
+from discs.chains.chain import ROLLING
 
 
 class Ring(NamedTuple):

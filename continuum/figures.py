@@ -17,7 +17,7 @@ from continuum.mesh import semidiscretise
 from continuum.rod import Rod, Scene
 from continuum.scenes import rolling_rod, untwisting_rod
 from discs import Midpoint, Suzuki4, simulate
-from discs.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, SIGNED, UNSIGNED
+from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, SIGNED, UNSIGNED
 
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 

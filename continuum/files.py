@@ -8,7 +8,7 @@ from typing import Any
 from continuum.rod import Scene
 from continuum.scenes import LAW, PAPER, SCENES, steered_rod
 from discs import checks
-from discs.files import opened
+from discs.files.safe import opened
 
 LARGEST = 2**14  # bytes of a scene file; a key of many parts, as a.a.a, takes memory as the square of its length
 

@@ -11,7 +11,7 @@ from continuum.free_start import Given, through
 from continuum.free_system import FreeRod, State
 from continuum.rod import Rod
 from discs import Chain, SimulationError
-from discs.chain import FEWEST
+from discs.chains.chain import FEWEST
 from discs.simulation import LOST
 
 TURN = 0.08  # rad: of the fastest link in a step; energy was kept to 1 % with it in all 43 random cases that were off

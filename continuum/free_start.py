@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from continuum.elements import lobatto
-from discs import Chain, checks, stencils
+from discs import Chain, checks
+from discs.chains import stencils
 
 Data = Callable[[NDArray], ArrayLike] | ArrayLike
 STRAIN = 1e-6  # what | |r'| - 1 | and r'.v', beside the largest |v'|, may be by rounding of the user's

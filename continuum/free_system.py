@@ -34,9 +34,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_banded
 
-from discs import Chain, stencils
-from discs.springs import LinearCurvature
-from discs.system import folded
+from discs import Chain
+from discs.chains import stencils
+from discs.chains.rolling_discs import folded
+from discs.chains.springs import LinearCurvature
 
 MOST_SWEEPS = 30
 

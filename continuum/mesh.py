@@ -7,7 +7,8 @@ import numpy as np
 from continuum.initial import resolve
 from continuum.pieces import POINTS
 from continuum.rod import Scene, SteeredRod
-from discs import Chain, Problem, State, SteeredChain, checks, stencils
+from discs import Chain, Problem, State, SteeredChain, checks
+from discs.chains import stencils
 
 UNSEEN = 1 / 4  # of an energy: discs that miss more than this of it do not see the initial fields
 
@@ -16,7 +17,7 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     """The field equations of a scene on n nodes, as the problem of n discs that they are.
 
     A node with its share of length is a disc, a finite difference of the potential is a spring: with the stencils of
-    `discs.stencils` the energy is that of a chain, and the constraint that of rolling discs. A closed scene makes a ring
+    `discs.chains.stencils` the energy is that of a chain, and the constraint that of rolling discs. A closed scene makes a ring
     whatever `ends` says. Discs with headings of their own (`SteeredRod`) have one kind of free ends, "springs".
 
     Parameters

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
-from discs.chain import CURVATURE, ROLLING
+from discs.chains.chain import CURVATURE, ROLLING
 
 Fields = Callable[[NDArray], tuple[NDArray, ...]]
 

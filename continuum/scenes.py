@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from continuum.rod import Rod, Scene, SteeredRod
 from discs import checks
-from discs.twist import PAPER, twisted
+from discs.chains.twist import PAPER, twisted
 
 LAW = ("curvature", "stretch_stiffness")
 

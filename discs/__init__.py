@@ -1,16 +1,16 @@
 """N rolling discs joined by springs: a finite-dimensional nonholonomic mechanical system."""
 
-from discs.archive import load
-from discs.chain import Chain, SteeredChain
-from discs.friction import first_slip, friction_needed
+from discs.chains.chain import Chain, SteeredChain
+from discs.files.archive import load
 from discs.integrators import RK4, Gauss4, Gauss6, Gauss8, Integrator, KahanLi6, Leapfrog, McLachlanPerlmutter, Midpoint, Suzuki4
-from discs.lagrange import lagrange_dalembert
-from discs.marching import SimulationError
 from discs.mechanics import MechanicalSystem
+from discs.mechanics.friction import first_slip, friction_needed
+from discs.mechanics.lagrange import lagrange_dalembert
 from discs.problem import Problem, State
+from discs.running.suggest import suggest_dt
+from discs.running.time_loop import SimulationError
 from discs.simulation import simulate
 from discs.solution import Solution
-from discs.step import suggest_dt
 
 __all__ = [
     "RK4",

@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from discs import command_line
-from discs.twist import DURATION, PAPER, STEERED, TURNS, untwisting_chain
+from discs.chains.twist import DURATION, PAPER, STEERED, TURNS, untwisting_chain
 
 UNITS = {
     "length": "length of the rod, length",

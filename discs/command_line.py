@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from discs.archive import QUANTITIES, describe, load, named, replacing
-from discs.files import check_writable, fresh
-from discs.framefile import FrameFile
+from discs.chains.stencils import ENDS
+from discs.files.archive import QUANTITIES, describe, load, named, replacing
+from discs.files.framefile import FrameFile
+from discs.files.safe import check_writable, fresh
+from discs.files.untrusted import printable
 from discs.integrators import METHODS
-from discs.marching import SimulationError
 from discs.problem import Problem
+from discs.running.step_error import doubts
+from discs.running.time_loop import SimulationError
 from discs.simulation import ENGINES, WANTS, simulate
 from discs.solution import Solution
-from discs.stencils import ENDS
-from discs.trust import doubts
-from discs.untrusted import printable
 
 OFFERS = sorted({name for method in METHODS.values() for name in method.offers})
 

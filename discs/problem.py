@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
-from discs.chain import Chain, SteeredChain
+from discs.chains.chain import Chain, SteeredChain
+from discs.chains.rolling_discs import RollingDiscs
+from discs.chains.slaved import SlavedSystem
+from discs.chains.steered import SteeredSystem
 from discs.loads import total
 from discs.skew import Load, Phase
-from discs.slaved import SlavedSystem
-from discs.steered import SteeredSystem
-from discs.system import RollingDiscs
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from discs import checks
 from discs.integrators import Integrator, find, from_settings
 from discs.integrators.base import Cut, Frame
-from discs.marching import March
 from discs.problem import Problem
-from discs.recording import Recording, Rows, kept_settings
+from discs.running.recording import Recording, Rows, kept_settings
+from discs.running.step_error import WARNED, Watch, cure, doubts
+from discs.running.suggest import suggest_dt
+from discs.running.time_loop import March
+from discs.running.tolerance import USUAL, NotReached, some_of, to_tolerance
 from discs.solution import Solution
-from discs.step import suggest_dt
-from discs.tolerance import USUAL, NotReached, some_of, to_tolerance
-from discs.trust import WARNED, Watch, cure, doubts
 from discs.warn import warn
 
 WANTS = ("velocity", "slope", "contact_force")
@@ -54,7 +54,7 @@ def simulate(
     want : what else to record: "velocity", "slope", "contact_force", and what the method offers (leapfrog: "modified_energy").
     progress : show a progress bar on anything that takes over a second.
     tol : instead of dt: runs with smaller and smaller steps until x, y, theta (and phi) are within this, relative to the
-        largest value of each, or, as {"omega": 1e-4}, the quantities named; see `discs.tolerance`.
+        largest value of each, or, as {"omega": 1e-4}, the quantities named; see `discs.running.tolerance`.
     checkpoint : a file, as "run.nc", that frames are written to as they come, in bounded memory. If it is there, the run that it
         holds goes on where it was interrupted, to the same bits as one unbroken run; see docs/archives.md. With tol (or "auto", or
         nothing) method and step are found first, by runs of at most 101 frames in memory; a run that goes on has those of its file.
@@ -63,7 +63,8 @@ def simulate(
     Returns
     -------
     Solution with exactly the frames asked for. A warning says where more than a hundredth of the energy was lost or gained, where
-    steps did not converge, and where dt is so long that positions or angles are off by more than a twentieth (`discs.trust`).
+    steps did not converge, and where dt is so long that positions or angles are off by more than a twentieth
+    (`discs.running.step_error`).
 
     Raises
     ------

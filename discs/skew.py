@@ -2,8 +2,8 @@ r"""The contract between mechanics and integrators: q' = C(q) pi, pi' = -C(q)^T 
 
 The columns of C span the velocities that the constraints allow, scaled so that C^T M C = 1 for the mass matrix M; pi are the rates
 along them. The constraint holds identically. Without loads f, H = |pi|^2/2 + V(q) is constant because the two factors C are each
-other's transpose. `discs.slaved` and `discs.steered` are chains in this form; the derivations stand there. `continuum.galerkin` is
-the field.
+other's transpose. `discs.chains.slaved` and `discs.chains.steered` are chains in this form; the derivations stand there.
+`continuum.galerkin` is the field.
 
 A configuration q is an array (rows, n), one row for each coordinate of a disc. All that V and C need of it is its *shape*: the
 differences between neighbours, and headings where a disc has its own. Shapes are formed from both parts of the positions.

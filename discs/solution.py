@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.problem import Problem, State
-from discs.trust import doubts
+from discs.running.step_error import doubts
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from discs.view import View
+    from discs.pictures.view import View
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,37 +128,37 @@ class Solution:
         return State(self.x[i], self.y[i], self.theta[i], self.omega[i], self.phi[i], self.phi_rate[i])
 
     def plot(self, *panels: str, ax: Any = None) -> "list[Axes]":
-        """A first look at the run: all panels, or those named; see `discs.figures.first_look`."""
-        from discs import figures  # pictures are imported when one is wanted
+        """A first look at the run: all panels, or those named; see `discs.pictures.figures.first_look`."""
+        from discs.pictures import figures  # pictures are imported when one is wanted
 
         return figures.first_look(self, panels, ax)
 
     def plot_motion(self, ax: "Axes | None" = None, **style: Any) -> "Axes":
-        """The centre line and the discs from above at several times; see `discs.figures.motion`."""
-        from discs import figures
+        """The centre line and the discs from above at several times; see `discs.pictures.figures.motion`."""
+        from discs.pictures import figures
 
         return figures.motion(self, ax, **style)
 
     def animate(self, path: str | Path, fps: float = 25, progress: bool = True, **style: Any) -> Path:
-        """A movie, .mp4 or .gif, of the discs as they roll, one picture a frame; see `discs.animation.animate`."""
-        from discs.animation import animate
+        """A movie, .mp4 or .gif, of the discs as they roll, one picture a frame; see `discs.pictures.animation.animate`."""
+        from discs.pictures.animation import animate
 
         return animate(self, path, fps, progress, **style)
 
     def view(self, path: str | Path | None = None, beside: "Solution | None" = None, **style: Any) -> "View":
-        """A page to turn and play the run in three dimensions, alone or beside another; see `discs.view.view`."""
-        from discs.view import view
+        """A page to turn and play the run in three dimensions, alone or beside another; see `discs.pictures.view.view`."""
+        from discs.pictures.view import view
 
         return view(self, path, beside, **style)
 
     def save(self, path: str | Path) -> None:
         """Write the run to a NetCDF-4 file, read again by `discs.load`; see docs/archives.md."""
-        from discs import archive
+        from discs.files import archive
 
         archive.save(self, path)
 
     def to_xarray(self) -> "xarray.Dataset":
         """The run as a dataset with dimensions (time, disc), units and names."""
-        from discs import archive
+        from discs.files import archive
 
         return archive.to_xarray(self)

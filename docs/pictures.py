@@ -14,9 +14,9 @@ from PIL import Image
 
 from compare import figures, lump
 from continuum import solve, untwisting_rod
-from discs import figures as of_discs
 from discs import simulate
-from discs.animation import Stage
+from discs.pictures import figures as of_discs
+from discs.pictures.animation import Stage
 
 IMAGES = Path(__file__).parent / "images"
 

@@ -21,9 +21,9 @@ from continuum.mesh import semidiscretise
 from continuum.scenes import PAPER, SCENES
 from discs import Chain, Problem, SimulationError, State, SteeredChain, load, simulate
 from discs.__main__ import main as discs_main
+from discs.chains.stencils import ENDS
+from discs.chains.twist import untwisting_chain
 from discs.integrators import METHODS
-from discs.stencils import ENDS
-from discs.twist import untwisting_chain
 
 MORE = int(os.environ.get("DISCS_CASES", "1"))
 pytestmark = pytest.mark.filterwarnings("default")  # warnings are for the user; here they are no failure

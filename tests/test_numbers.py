@@ -12,10 +12,10 @@ from continuum import Rod, Scene, SteeredRod, breathing_ring, free_rod, rolling_
 from continuum.files import read_scene
 from continuum.scenes import PAPER
 from discs import Chain, Gauss6, Midpoint, Problem, State, SteeredChain, checks, first_slip, simulate
-from discs.oscillators import contact_oscillator, driven_oscillator
+from discs.chains.twist import untwisting_chain
+from discs.mechanics.oscillators import contact_oscillator, driven_oscillator
+from discs.mechanics.textbook import chaplygin_sleigh, knife_edge, rolling_disc
 from discs.simulation import frame_times
-from discs.textbook import chaplygin_sleigh, knife_edge, rolling_disc
-from discs.twist import untwisting_chain
 
 OWN = {"heading_inertia": 0.3, "stretch_stiffness": 4.0, "shear_stiffness": 3.0}
 LINE = np.arange(5.0)

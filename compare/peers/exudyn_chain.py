@@ -1,11 +1,11 @@
 """The chain of discs with their own headings in Exudyn: rigid wheels on a plane, its own rolling joint, its own beam.
 
-Nothing of `discs.steered` is used for the motion. A disc is a rigid body of six coordinates that `ObjectJointRollingDisc` lets
-roll on the plane, by three Lagrange multipliers at velocity level, and that one more holds upright. A massless fork sits on each
-axle, a planar frame (x, y, phi) that follows the wheel and does not roll. Between forks `ObjectBeamGeometricallyExact2D`, a planar
-Simo-Reissner beam of two nodes and one point of integration, has exactly the stretch, shear and bending of a link; a linear spring
-between rolls is its torsion. Exudyn's implicit trapezoidal rule or generalised alpha integrates: 9 coordinates and 7 multipliers
-a disc, all compiled.
+Nothing of `discs.chains.steered` is used for the motion. A disc is a rigid body of six coordinates that `ObjectJointRollingDisc`
+lets roll on the plane, by three Lagrange multipliers at velocity level, and that one more holds upright. A massless fork sits on
+each axle, a planar frame (x, y, phi) that follows the wheel and does not roll. Between forks `ObjectBeamGeometricallyExact2D`, a
+planar Simo-Reissner beam of two nodes and one point of integration, has exactly the stretch, shear and bending of a link; a linear
+spring between rolls is its torsion. Exudyn's implicit trapezoidal rule or generalised alpha integrates: 9 coordinates and 7
+multipliers a disc, all compiled.
 
 Axes: Exudyn's X is up, its (Y, Z) are our (x, y). Then Rot_X Rot_Y Rot_Z, the angles of `NodeRigidBodyRxyz`, are heading, lean and
 roll, each a coordinate of its own: the roll never wraps, and the angles are singular only at a lean of 90 degrees.

@@ -1,6 +1,6 @@
 r"""The chain with slaved headings in Exudyn, with its multipliers: a peer of order 2 that takes equal steps.
 
-Nothing of the reduced equations of `discs.slaved` is used for the motion. Exudyn gets
+Nothing of the reduced equations of `discs.chains.slaved` is used for the motion. Exudyn gets
 
     M v. + K q = f + A(q)^T lambda,   A(q) v = 0,   q. = v,
 
@@ -31,7 +31,8 @@ from exudyn import itemInterface as items
 from numpy.typing import NDArray
 
 from compare.peers.peer import Cutoff, Outcome, Peer
-from discs import Chain, Problem, stencils
+from discs import Chain, Problem
+from discs.chains import stencils
 
 STEPS = (45.0, 90.0, 180.0, 360.0, 720.0)
 BLOCK = 16  # discs that share a node and a connector; fewer are more calls of Python, more are larger dense matrices

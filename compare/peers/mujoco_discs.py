@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 
 from compare.peers.peer import Cutoff, Outcome, Peer
 from discs import Chain, Problem
-from discs.step import suggest_dt
+from discs.running.suggest import suggest_dt
 
 X, Y, UP, HEADING, ROLL = range(5)
 ORDER = [X, Y, ROLL, HEADING]  # as the rows of a system

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from discs.chains.rolling_discs import RollingDiscs
 from discs.skew import Phase
-from discs.system import RollingDiscs
 
 
 @dataclass
@@ -119,8 +119,10 @@ class Integrator(ABC):
         """The memory that was kept; `memory` is that of `begin`, of the same run."""
 
     def finer(self, system: RollingDiscs, memory: Any, t: float, h: float, chain: Any = None) -> NDArray | None:
-        """Positions (rows, n) one step h later, of an error several times smaller, for `discs.trust`; None: steps are checked as
-        they are taken."""
+        """Positions (rows, n) one step h later, of an error several times smaller, for `discs.running.step_error`.
+
+        None: steps are checked as they are taken.
+        """
         return None
 
     def extras(self, system: RollingDiscs, memory: Any, h: float) -> dict[str, float]:

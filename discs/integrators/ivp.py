@@ -9,10 +9,10 @@ import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
 from discs import checks
+from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
 from discs.integrators.base import Frame, Integrator, Work
 from discs.skew import Phase
-from discs.system import RollingDiscs
 
 
 class Reduced:

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import FixedStep, Frame, Work
 from discs.integrators.rk4 import RK4
 from discs.kernels import protocol as do
@@ -13,7 +14,6 @@ from discs.kernels.compiled import Cost, fill
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import back, copy, forward, square
 from discs.skew import Phase, add
-from discs.system import RollingDiscs
 
 
 class TwoStep(NamedTuple):

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
+from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import OneStep, Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import back, forward, largest
 from discs.skew import Phase, add
-from discs.system import RollingDiscs
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from typing import Any
 
-from discs.chain import Chain, SteeredChain
+from discs.chains.chain import Chain, SteeredChain
 from discs.integrators import METHODS
 from discs.problem import Problem, State
 from discs.simulation import simulate

@@ -1,4 +1,6 @@
-"""The compiled driver: any method's steps of any chain, with the guards that every run has; its plain twin is `discs.marching`.
+"""The compiled driver: any method's steps of any chain, with the guards that every run has.
+
+Its plain twin is `discs.running.time_loop`.
 
 Methods fill in `step` beside their plain form, in `discs.integrators`; chains what a step asks of them, beside this file.
 """

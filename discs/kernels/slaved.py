@@ -1,4 +1,4 @@
-"""The chain of slaved headings, linear curvature, in compiled form; its derivation and its plain twin are `discs.slaved`.
+"""The chain of slaved headings, linear curvature, in compiled form; its derivation and its plain twin are `discs.chains.slaved`.
 
 Links are held with one more at each end: link j lies before disc j, link j + 1 after it. Around a ring links 0 and n are the
 same; at free ends they are the ghosts that make the headings there central, d_0 = 2 d_1 - d_2 ("springs", "paper") or
@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.chain import Chain
+from discs.chains.chain import Chain
+from discs.chains.springs import LinearCurvature
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.limits import LOST_HEADING
 from discs.kernels.load import UNLOADED
 from discs.kernels.shared import forward, renew
 from discs.kernels.slaved_matrix import GHOST, PLAIN, RING, Matrix, assemble, factor, solve
-from discs.springs import LinearCurvature
 
 
 class Slaved(NamedTuple):

@@ -1,4 +1,4 @@
-"""The chain of discs with their own heading in compiled form; its derivation and its plain twin are `discs.steered`.
+"""The chain of discs with their own heading in compiled form; its derivation and its plain twin are `discs.chains.steered`.
 
 Links are held with one more at each end: link j lies before disc j. Around a ring links 0 and n are the same; at free ends they
 have no stiffness.
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.chain import SteeredChain
+from discs.chains.chain import SteeredChain
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.load import UNLOADED
@@ -57,7 +57,7 @@ class Work(NamedTuple):
     """Of the base position: base (4, n + 1), differences of neighbours; angles (4, n + 1), cosine and sine of headings and of the
     mean headings of links; strain (4, n + 1).
 
-    Of a position or a step, see `discs.steered`: links, along, tension (4, n + 1), across (2, n + 1), couple (n + 1,).
+    Of a position or a step, see `discs.chains.steered`: links, along, tension (4, n + 1), across (2, n + 1), couple (n + 1,).
     """
 
     base: NDArray

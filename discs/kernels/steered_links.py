@@ -1,4 +1,4 @@
-"""The springs between discs with their own heading: geometry, strains and tensions of links, see `discs.steered`.
+"""The springs between discs with their own heading: geometry, strains and tensions of links, see `discs.chains.steered`.
 
 `work` is that of `discs.kernels.steered`. The cosines of a step's angles come from those of its start and of the step: two pairs
 for each disc and sweep.

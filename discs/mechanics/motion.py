@@ -38,7 +38,7 @@ STALLED, STALLED_NEAR = 1000, 50  # this many steps over less than 1e-6 of the t
 class Trajectory:
     """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,).
 
-    mu : (F, c), the charges of a vakonomic motion, see `discs.vakonomic`; None if it is nonholonomic.
+    mu : (F, c), the charges of a vakonomic motion, see `discs.mechanics.vakonomic`; None if it is nonholonomic.
     stats : "method", "rtol" as used, "steps", "evaluations" (of accelerations), "rank_drops" (times at which constraints were
         dependent), and "derivatives": of each formula how they were taken and their largest relative error at the frames.
 

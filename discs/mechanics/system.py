@@ -18,7 +18,7 @@ The reduced form has no multipliers. With the columns of B spanning the kernel o
 
     v. = w + B u,   B^T M B u = B^T (f - M w),   lambda = (A A^T)^{-1} A (M v. - f).
 
-The skew-gradient form of `discs.system` takes the B with B^T M B = 1. The three are one system of equations.
+The skew-gradient form of `discs.chains.rolling_discs` takes the B with B^T M B = 1. The three are one system of equations.
 """
 
 import inspect
@@ -48,7 +48,7 @@ class Response(NamedTuple):
 class MechanicalSystem:
     """A mechanical system with linear velocity constraints; m coordinates, c constraints.
 
-    Make one with `discs.lagrange.lagrange_dalembert` from discs, with `from_lagrangian` from formulas, or from its parts.
+    Make one with `discs.mechanics.lagrange.lagrange_dalembert` from discs, with `from_lagrangian` from formulas, or from its parts.
 
     Attributes
     ----------
@@ -171,7 +171,8 @@ class MechanicalSystem:
         return Response(*saddle.solve(self.mass(q), self.constraint(q), f, g, self.names, self.owners))
 
     def magnetic(self, q: ArrayLike, v: ArrayLike) -> NDArray:
-        """G of the vakonomic equations, (m, c): (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) v_k; see `discs.vakonomic`."""
+        """G of the vakonomic equations, (m, c): (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) v_k; see
+        `discs.mechanics.vakonomic`."""
         q, v = self._vectors(q, v)
         slopes = (self.constraint_rate(q, unit) for unit in np.eye(len(q)))
         d = np.stack([dense(a) for a in slopes], axis=-1)  # dA_ak/dq_j
@@ -257,7 +258,7 @@ class MechanicalSystem:
         q, v : (m,), coordinates and velocities at times[0].
         times : (F,), increasing, or all decreasing.
         rtol : tolerance of a step's error, relative to each coordinate.
-        mu : (c,), charges at times[0] of the vakonomic motion, see `discs.vakonomic`; without them it is nonholonomic.
+        mu : (c,), charges at times[0] of the vakonomic motion, see `discs.mechanics.vakonomic`; without them it is nonholonomic.
         method : "DOP853", "RK45", "RK23" (explicit), "Radau", "BDF", "LSODA" (for stiff problems), or "auto": DOP853, and
             Radau from where the problem is stiff. `Trajectory.stats` tells which.
         atol : tolerance of a step's error, absolute: a number or one per entry of (q, v) or (q, v, mu). By default 1e-3 rtol of

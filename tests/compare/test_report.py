@@ -13,7 +13,7 @@ import pytest
 from compare import report as module
 from compare import stability
 from compare.__main__ import main
-from compare.hard_cases import cases
+from compare.hardcases.cases import cases
 from compare.report import Page, report
 
 FLAGS = (
@@ -38,8 +38,8 @@ def written(tmp_path_factory):
         patch.setattr(module, "background", here)
         patch.setattr(module, "speed_peers", lambda problem: [])
         patch.setattr(module, "stability", partial(stability, methods=methods))
-        patch.setattr("compare.stability_table.cases", lambda quick: few)
-        patch.setattr("compare.stability_table._listed", lambda quick: {c.key: c for c in few})
+        patch.setattr("compare.hardcases.table.cases", lambda quick: few)
+        patch.setattr("compare.hardcases.table._listed", lambda quick: {c.key: c for c in few})
         report(out, n=(9, 17), tol=1e-2, timed=9, long=0.2, progress=False)
     return out
 

@@ -10,11 +10,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from compare import lump, stability, stability_table
+from compare import lump, stability
 from compare.__main__ import main
-from compare.hard_cases import cases
-from compare.hard_problems import rolling_waves
-from compare.hard_runs import CONSERVING, EXPLICIT, FIXED, GAUSS, OURS, PEERS, Expectation, Found
+from compare.hardcases import table as stability_table
+from compare.hardcases.cases import cases
+from compare.hardcases.problems import rolling_waves
+from compare.hardcases.runs import CONSERVING, EXPLICIT, FIXED, GAUSS, OURS, PEERS, Expectation, Found
 from compare.sweeps import read
 from continuum import untwisting_rod
 from continuum.dispersion import growth
@@ -170,7 +171,7 @@ def test_a_failing_method_is_shown_as_one(monkeypatch):
         run.energy[-1] *= 1.5
         return run
 
-    monkeypatch.setattr("compare.hard_runs.simulate", leaky)
+    monkeypatch.setattr("compare.hardcases.runs.simulate", leaky)
     with ThreadPoolExecutor(1) as here:
         found = stability(True, names=("rough random roll",), methods=("midpoint",), seconds=9.0, executor=here, progress=False)
     assert found.failures

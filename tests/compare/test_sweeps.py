@@ -22,7 +22,7 @@ from compare.sweep_archive import Archive
 from compare.sweeps import _identity, read
 from continuum import untwisting_rod
 from discs import simulate
-from discs.twist import untwisting_chain
+from discs.chains.twist import untwisting_chain
 
 
 def end_disc(case):

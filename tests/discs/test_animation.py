@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from discs import Chain, Problem, Solution, State, simulate
-from discs.animation import Stage, animate
+from discs.pictures.animation import Stage, animate
 from tests.conftest import Model, uneven
 
 

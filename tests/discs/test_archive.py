@@ -11,8 +11,9 @@ import pytest
 import xarray
 
 from continuum import solve, steered_rod, untwisting_rod
-from discs import Problem, Solution, archive, framefile, load, simulate
+from discs import Problem, Solution, load, simulate
 from discs.__main__ import main
+from discs.files import archive, framefile
 from tests.conftest import ALL, Model, models, uneven
 
 
@@ -307,7 +308,7 @@ def test_import_is_lazy():
 MEMORY = """
 import pathlib, re, sys, threading, time
 from discs import simulate
-from discs.twist import untwisting_chain
+from discs.chains.twist import untwisting_chain
 
 def held(what):
     return 1024 * int(re.search(what + ":[^0-9]*([0-9]+) kB", pathlib.Path("/proc/self/status").read_text())[1])

@@ -13,7 +13,7 @@ import pytest
 from continuum.__main__ import parser as parser_of_continuum
 from discs import Solution, load, simulate
 from discs.__main__ import main, parser
-from discs.twist import untwisting_chain
+from discs.chains.twist import untwisting_chain
 from tests.discs.test_archive import same
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discs import Chain, Problem, Solution, State, SteeredChain, simulate
-from discs.contact import footprints_touch, rolling_in_pymunk
+from discs.mechanics.contact import footprints_touch, rolling_in_pymunk
 
 M, SPIN, R, SPRING, TWIST, G = 1.3, 0.4, 0.7, 0.9, 1.4, 9.3
 DISC = {"mass": M, "spin_inertia": SPIN, "radius": R, "stiffness": SPRING, "twist": TWIST, "gravity": G}

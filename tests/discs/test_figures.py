@@ -6,8 +6,9 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from discs import figures, poses, simulate
-from discs.style import ORANGE
+from discs import simulate
+from discs.pictures import figures, geometry
+from discs.pictures.style import ORANGE
 from tests.conftest import Model, uneven
 
 
@@ -20,7 +21,7 @@ def test_imports_are_light_and_open_no_window():
 import sys
 import discs, continuum
 assert not {"matplotlib", "PIL", "imageio_ffmpeg"} & set(sys.modules)
-import discs.figures, discs.animation, discs.view
+import discs.pictures.figures, discs.pictures.animation, discs.pictures.view
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -32,34 +33,34 @@ assert "matplotlib.pyplot" not in sys.modules
 def test_slopes_from_positions_are_those_of_the_chain(ends, rolling):
     recorded, bare = run_of(ends, rolling, want=("slope",)), run_of(ends, rolling)
     inner = slice(None) if ends in ("springs", "paper", "ring") else slice(1, -1)  # a ghost disc is not known here
-    np.testing.assert_allclose(poses.slopes(bare)[..., inner], poses.slopes(recorded)[..., inner], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(geometry.slopes(bare)[..., inner], geometry.slopes(recorded)[..., inner], rtol=0, atol=1e-12)
 
 
 def test_axles_are_across_the_velocity(ends, rolling):
     run = run_of(ends, rolling, want=("slope", "velocity"))
-    axle, rate = poses.axles(run), np.stack([run.x_rate, run.y_rate], axis=1)
+    axle, rate = geometry.axles(run), np.stack([run.x_rate, run.y_rate], axis=1)
     np.testing.assert_allclose(np.hypot(axle[:, 0], axle[:, 1]), 1, rtol=1e-14)
     np.testing.assert_allclose((axle * rate).sum(axis=1), 0, atol=1e-12)
     # a positive rate rolls along J d_1
-    assert (np.sign((poses.turn(axle) * rate).sum(axis=1)) == np.sign(run.omega)).all()
+    assert (np.sign((geometry.turn(axle) * rate).sum(axis=1)) == np.sign(run.omega)).all()
 
 
 def test_axles_of_own_headings():
     run = run_of(law="steered")
-    np.testing.assert_array_equal(poses.axles(run), np.stack([np.cos(run.phi), np.sin(run.phi)], axis=1))
+    np.testing.assert_array_equal(geometry.axles(run), np.stack([np.cos(run.phi), np.sin(run.phi)], axis=1))
 
 
 def test_rings_are_known_from_their_positions(ends):
-    assert poses.is_ring(run_of(ends)) == (ends == "ring")
+    assert geometry.is_ring(run_of(ends)) == (ends == "ring")
 
 
 def test_picked_discs_are_spread_over_the_rod():
     s = np.sort(np.random.default_rng(3).uniform(0, 2, 200))
-    picked = poses.picked(s, 11)
+    picked = geometry.picked(s, 11)
     assert picked[0] == 0
     assert picked[-1] == 199
     np.testing.assert_allclose(s[picked], np.linspace(s[0], s[-1], 11), atol=np.diff(s).max())
-    np.testing.assert_array_equal(poses.picked(s, 101), np.arange(200))
+    np.testing.assert_array_equal(geometry.picked(s, 101), np.arange(200))
 
 
 # ---- figures

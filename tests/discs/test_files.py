@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from discs import archive, files, finishing, load, recording, simulate
+from discs import load, simulate
 from discs.__main__ import main
-from discs.twist import untwisting_chain
+from discs.chains.twist import untwisting_chain
+from discs.files import archive, finishing, safe
+from discs.running import recording
 from tests.conftest import Model, uneven
 from tests.discs.test_archive import same
 from tests.discs.test_restart import Stop, equal, stopped
@@ -65,7 +67,7 @@ def test_the_second_of_two_runs_on_a_path_is_refused(tmp_path, capsys):
 
 
 WITHOUT_LOCKS = (
-    "import sys; from discs import files; from discs.__main__ import main; files.fcntl = None; sys.exit(main(sys.argv[1:]))"
+    "import sys; from discs import files; from discs.__main__ import main; safe.fcntl = None; sys.exit(main(sys.argv[1:]))"
 )
 
 
@@ -127,7 +129,7 @@ def test_an_archive_older_than_its_restart_file_is_refused_at_the_beginning(tmp_
         np.savez(new, **kept | {"frame": 4})
     there = load(path).t.size
     assert 0 < there < 4
-    monkeypatch.setattr("discs.marching.March.to", None)  # not a step
+    monkeypatch.setattr("discs.running.time_loop.March.to", None)  # not a step
     message = (
         rf"run\.nc is older than run\.nc\.restart, which goes on at frame 4: frame {there} is not there; without it the run starts"
     )
@@ -180,7 +182,7 @@ def test_a_kill_in_the_middle_of_the_end_is_put_right(tmp_path, monkeypatch):
 FULL = """
 import sys, warnings
 from discs import load, simulate
-from discs.twist import untwisting_chain
+from discs.chains.twist import untwisting_chain
 problem = untwisting_chain(64)
 settled = dict(dt=0.05, engine="plain", progress=False)
 said = lambda error: print(str(error).replace(sys.argv[1], "DISC"))
@@ -236,7 +238,7 @@ def test_a_disc_that_fills_up_on_the_way(tmp_path, monkeypatch):
     equal(found, whole)
     path.unlink()
     with monkeypatch.context() as patched:
-        patched.setattr(files, "write_all", full)
+        patched.setattr(safe, "write_all", full)
         message = r"frame 0 of .*run\.nc cannot be written: No space left on device; the same call goes on from the beginning"
         with pytest.raises(OSError, match=message):
             simulate(PROBLEM, **SETTLED, checkpoint=path)
@@ -305,7 +307,7 @@ def test_other_endings_are_refused(name, tmp_path, capsys):
 
 def test_what_a_kill_leaves_of_a_save_is_removed_by_the_next(tmp_path):
     code = (
-        "import os, sys, signal; from discs import framefile, simulate; from discs.twist import untwisting_chain;"
+        "import os, sys, signal; from discs import framefile, simulate; from discs.chains.twist import untwisting_chain;"
         "run = simulate(untwisting_chain(5), dt=0.5, frames=2, engine='plain', progress=False);"
         "framefile.FrameFile.write = lambda *a: os.kill(os.getpid(), signal.SIGKILL); run.save(sys.argv[1])"
     )
@@ -314,7 +316,7 @@ def test_what_a_kill_leaves_of_a_save_is_removed_by_the_next(tmp_path):
     left = list(tmp_path.iterdir())
     assert len(left) == 1
     assert left[0].name.startswith(".discs-partial-")
-    with files.fresh(tmp_path / "other.txt"):  # not what another one writes at the time
+    with safe.fresh(tmp_path / "other.txt"):  # not what another one writes at the time
         simulate(PROBLEM, **SETTLED).save(tmp_path / "b.nc")
         assert len(list(tmp_path.iterdir())) == 2
     assert sorted(p.name for p in tmp_path.iterdir()) == ["b.nc", "other.txt"]
@@ -329,7 +331,7 @@ def test_everything_is_on_the_disc_before_it_counts(tmp_path, monkeypatch):
 
     def fsync(fd):
         found = Path(os.readlink(f"/proc/self/fd/{fd}")).name
-        happened.append(("disc", "new" if found.startswith(files.PARTIAL) else found))
+        happened.append(("disc", "new" if found.startswith(safe.PARTIAL) else found))
         real["fsync"](fd)
 
     def replace(old, new):

@@ -8,7 +8,7 @@ import sympy
 
 from discs.mechanics import MechanicalSystem
 from discs.mechanics.derivatives import Formula
-from discs.vakonomic import rolling_disc
+from discs.mechanics.vakonomic import rolling_disc
 
 Q, V = np.array([1.2, 0.5, -0.3, 0.9]), np.array([0.3, 0.2, -0.7, 1.0])
 SYMBOLS = sympy.symbols("a:4")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from discs import Gauss8, Problem, State, SteeredChain, simulate
-from discs.friction import first_slip, friction_needed
 from discs.integrators import METHODS, find
+from discs.mechanics.friction import first_slip, friction_needed
 from tests.conftest import SLAVED, STEERED, Model, models, uneven
 from tests.discs.test_integrators import FIXED, STEPS, tight
 from tests.discs.test_system import contact_from_the_definition

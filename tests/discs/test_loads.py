@@ -7,9 +7,9 @@ import pytest
 
 from discs import Chain, Midpoint, Problem, State, simulate
 from discs.integrators import METHODS, Work
-from discs.lagrange import frames as coordinates
-from discs.lagrange import lagrange_dalembert
 from discs.loads import Linear, Load
+from discs.mechanics.lagrange import frames as coordinates
+from discs.mechanics.lagrange import lagrange_dalembert
 from tests.conftest import Model, models, uneven
 
 KINDS = [

@@ -8,8 +8,8 @@ import scipy.linalg as la
 from scipy.sparse.csgraph import connected_components
 
 from discs import Gauss8, Problem, State, SteeredChain, simulate
-from discs.lagrange import frames, lagrange_dalembert
 from discs.mechanics import MechanicalSystem
+from discs.mechanics.lagrange import frames, lagrange_dalembert
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 from tests.discs.test_system import contact_from_the_definition, directional, potential_from_the_definition
 

@@ -6,10 +6,10 @@ import pytest
 from discs import Gauss8, Problem, State, SteeredChain, simulate
 from discs.integrators import METHODS, Leapfrog, Work
 from discs.integrators.leapfrog import TwoStep
-from discs.lagrange import frames, lagrange_dalembert
 from discs.mechanics import MechanicalSystem
-from discs.momentum import admissible_symmetries, nonholonomic_momenta, symmetry_momenta
-from discs.vakonomic import agreeing_multipliers
+from discs.mechanics.lagrange import frames, lagrange_dalembert
+from discs.mechanics.momentum import admissible_symmetries, nonholonomic_momenta, symmetry_momenta
+from discs.mechanics.vakonomic import agreeing_multipliers
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 from tests.discs.test_integrators import ADAPTIVE, moved, tight
 from tests.discs.test_textbook import CLOSED, TIMES

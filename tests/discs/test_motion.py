@@ -5,9 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from discs import textbook
-from discs.lagrange import frames, lagrange_dalembert
-from discs.mechanics import MechanicalSystem
+from discs.mechanics import MechanicalSystem, textbook
+from discs.mechanics.lagrange import frames, lagrange_dalembert
 from tests.conftest import SLAVED, STEERED, uneven
 from tests.discs.test_textbook import CLOSED, contact, driven
 

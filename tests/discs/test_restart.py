@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discs import SimulationError, load, recording, simulate
+from discs import SimulationError, load, simulate
+from discs.chains.twist import untwisting_chain
 from discs.integrators import METHODS, solvers
-from discs.twist import untwisting_chain
+from discs.running import recording
 from tests.conftest import STEERED, Model, uneven
 from tests.discs.test_archive import same
 
@@ -54,7 +55,7 @@ def equal(a, b):
 )
 @pytest.mark.parametrize("name", METHODS)
 def test_goes_on_to_the_same_bits(name, model, engine, tmp_path, monkeypatch):
-    monkeypatch.setattr("discs.marching.CHUNK", 1)  # pauses after every step, whatever the engine
+    monkeypatch.setattr("discs.running.time_loop.CHUNK", 1)  # pauses after every step, whatever the engine
     problem, path = uneven(7, model), tmp_path / "run.nc"
     dt = 0.004 if np.isfinite(METHODS[name]().stability_limit) else 0.05
     frames = np.array([0.0, 0.013, 0.11, 0.2, 0.43, 0.431, 0.7])
@@ -206,7 +207,9 @@ def test_ctrl_c(tmp_path):
 
 KILLS = """
 import json, os, random, signal, sys, time
-from discs import framefile, load, recording, simulate
+from discs import load, simulate
+from discs.files import framefile
+from discs.running import recording
 from tests.conftest import Model, uneven
 
 problem, path, kills = uneven(40, Model("springs", "field")), sys.argv[1], int(sys.argv[2])
@@ -276,7 +279,7 @@ def test_kill_loses_nothing_but_the_frame_in_flight(tmp_path):
 def test_same_input_same_bits():
     """In this process and in another."""
     code = (
-        "from discs import simulate; from discs.twist import untwisting_chain;"
+        "from discs import simulate; from discs.chains.twist import untwisting_chain;"
         "runs = [simulate(untwisting_chain(16, duration=0.5), method, 0.02, 3, engine=engine, progress=False)"
         " for method, engine in (('midpoint', 'compiled'), ('gauss6', 'plain'), ('Radau', 'plain'))];"
         "found = ''.join(run.x.tobytes().hex() + run.theta.tobytes().hex() for run in runs)"

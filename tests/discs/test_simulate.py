@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from compare import lump
-from compare.hard_problems import rough
+from compare.hardcases.problems import rough
 from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.mesh import semidiscretise
 from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, Suzuki4, simulate, suggest_dt
+from discs.chains.twist import untwisting_chain
 from discs.command_line import summary
 from discs.integrators import METHODS
 from discs.simulation import steps_before
-from discs.twist import untwisting_chain
 from tests.conftest import Model, models, uneven
 
 PARAMETERS = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from discs import stencils
+from discs.chains import stencils
 
 N, LENGTH = 9, 2.6
 FEWEST = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}

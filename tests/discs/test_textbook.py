@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from discs import oscillators, textbook
+from discs.mechanics import oscillators, textbook
 
 DISC = {"mass": 1.3, "spin_inertia": 0.6, "heading_inertia": 0.4, "radius": 0.7}
 CLOSED = {

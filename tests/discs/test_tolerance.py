@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from compare import lump
-from compare.hard_problems import rough
+from compare.hardcases.problems import rough
 from continuum import breathing_ring, rolling_rod, steered_rod, untwisting_rod
 from discs import Gauss6, Gauss8, SimulationError, checks, simulate
 from discs.integrators import DOP853
-from discs.tolerance import ATTEMPTS, to_tolerance
+from discs.running.tolerance import ATTEMPTS, to_tolerance
 from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
 
@@ -134,7 +134,7 @@ def test_without_any_setting_a_run_is_to_a_thousandth():
 
 
 def test_where_a_thousandth_is_out_of_reach_that_is_a_warning(monkeypatch):
-    monkeypatch.setattr("discs.tolerance.ATTEMPTS", 4)
+    monkeypatch.setattr("discs.running.tolerance.ATTEMPTS", 4)
     problem = lump(untwisting_rod(twist=2.0), 33, "consistent")
     with pytest.warns(UserWarning, match=r"tol = 0.001 was not reached: the error is estimated at .*: this is the last run"):
         run = simulate(problem, progress=False)

@@ -8,8 +8,9 @@ from numpy.polynomial import Chebyshev
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
 
-from discs import MechanicalSystem, figures, simulate
-from discs.vakonomic import agreeing_multipliers, of_chain, rolling_disc, solve
+from discs import MechanicalSystem, simulate
+from discs.mechanics.vakonomic import agreeing_multipliers, of_chain, rolling_disc, solve
+from discs.pictures import figures
 from tests.conftest import Model, models, uneven
 from tests.discs.test_system import contact_from_the_definition, potential_from_the_definition
 

@@ -12,9 +12,11 @@ from PIL import Image
 
 from continuum import solve, untwisting_rod
 from continuum.mesh import semidiscretise
-from discs import Problem, State, SteeredChain, poses, simulate, textbook
+from discs import Problem, State, SteeredChain, simulate
+from discs.mechanics import textbook
+from discs.pictures import geometry
+from discs.pictures.view import View, view
 from discs.solution import Solution
-from discs.view import View, view
 from tests.conftest import Model, uneven
 
 FLAGS = """--headless=new --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --window-size=700,600
@@ -325,7 +327,7 @@ def pair():
 
 def single():
     book = textbook.rolling_disc(1.3, 0.6, 0.4, 0.7, roll_rate=1.1, turn_rate=0.8, slope=2.1)
-    return poses.one_disc(book.integrate(np.linspace(0, 2, 21)), 0.7)
+    return geometry.one_disc(book.integrate(np.linspace(0, 2, 21)), 0.7)
 
 
 def data_of(page: View):
@@ -347,7 +349,7 @@ def test_page_is_small_and_takes_nothing_from_outside(run):
     page = run.view().page
     assert len(page.encode()) < 1.2e6
     assert page.isascii()  # the hashes of its policy hold in whatever encoding it is read
-    ours = page.replace(files("discs").joinpath("data", "three.min.js").read_text(encoding="utf-8"), "")
+    ours = page.replace(files("discs").joinpath("pictures", "data", "three.min.js").read_text(encoding="utf-8"), "")
     assert not re.search(r"https?:|src=|@import|<link|url\(", ours)
 
 
@@ -376,12 +378,12 @@ def test_how_far_lines_between_frames_are_off():
     even = replace(even, phi=column)
     h, radius = 0.4, 0.1
     sagitta = 0.5 * (1 - np.cos(h / 2)) / radius
-    assert poses.off_between_frames(even, radius) == pytest.approx(sagitta, rel=0.02)
+    assert geometry.off_between_frames(even, radius) == pytest.approx(sagitta, rel=0.02)
     known = replace(even, stats={"radius": 0.5})
-    assert sagitta < poses.off_between_frames(known, radius) < 1.1 * sagitta
+    assert sagitta < geometry.off_between_frames(known, radius) < 1.1 * sagitta
     faster = replace(even, theta=column**2, omega=2 * column, x=none, y=none)
-    assert poses.off_between_frames(faster, radius) == pytest.approx(h**2 / 4)
-    assert poses.off_between_frames(replace(faster, stats={"radius": 0.5}), radius) > h**2 / 4
+    assert geometry.off_between_frames(faster, radius) == pytest.approx(h**2 / 4)
+    assert geometry.off_between_frames(replace(faster, stats={"radius": 0.5}), radius) > h**2 / 4
 
 
 def test_one_disc_from_above():
@@ -389,7 +391,7 @@ def test_one_disc_from_above():
     assert len(single().plot()) == 3
     with pytest.raises(ValueError, match="panel must be one of 'motion', 'end', 'energy'; got 'theta'"):
         single().plot("theta")
-    assert poses.drawn_radius(single(), None) == 0.7
+    assert geometry.drawn_radius(single(), None) == 0.7
 
 
 @pytest.mark.parametrize(
@@ -418,4 +420,4 @@ def test_what_cannot_be_seen_is_refused(run):
     with pytest.raises(ValueError, match="one disc has no line that its axle could follow: give its heading phi"):
         replace(single(), phi=None).view()
     with pytest.raises(ValueError, match="one disc has the coordinates x, y, theta, phi; got 3 of them"):
-        poses.one_disc(textbook.knife_edge(1.3, 0.4, slope=0.0, speed=1.0, turn_rate=0.5).integrate([0.0, 1.0]), 0.7)
+        geometry.one_disc(textbook.knife_edge(1.3, 0.4, slope=0.0, speed=1.0, turn_rate=0.5).integrate([0.0, 1.0]), 0.7)

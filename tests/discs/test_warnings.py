@@ -11,7 +11,7 @@ from compare import convergence
 from continuum import Rod, Scene, solve
 from discs import Problem, State, simulate
 from discs.__main__ import main
-from discs.twist import untwisting_chain
+from discs.chains.twist import untwisting_chain
 
 LIMP = untwisting_chain(5, duration=0.1, bending_stiffness=0.0)
 ROLLING = Problem(LIMP.chain, State(LIMP.initial.x, LIMP.initial.y, LIMP.initial.theta, omega=1.0), 0.1)

@@ -16,10 +16,11 @@ import atheris
 
 with atheris.instrument_imports(include=["discs", "continuum", "tomllib"]):
     from continuum.files import read_scene
-    from discs import Solution, load, recording, simulate
+    from discs import Solution, load, simulate
+    from discs.chains.twist import untwisting_chain
     from discs.command_line import about
-    from discs.restart import read_restart
-    from discs.twist import untwisting_chain
+    from discs.files.restart import read_restart
+    from discs.running import recording
 
 FOLDER = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
 QUANTITIES = ("x", "y", "theta", "omega", "energy")

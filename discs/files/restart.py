@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from discs import archive, files
-from discs.finishing import put_back
-from discs.framefile import DAMAGE, FrameFile
+from discs.files import archive, safe
+from discs.files.finishing import put_back
+from discs.files.framefile import DAMAGE, FrameFile
 
 FROM_THE_BEGINNING = "without it the run starts from the beginning, so delete it"
 
@@ -37,7 +37,7 @@ class Restart:
     def take(self) -> None:
         """Lock the file and read it. ValueError if another process has it, or it is damaged, or none can be made for a new run."""
         try:
-            self._fd = files.hold(self.path)
+            self._fd = safe.hold(self.path)
         except BlockingIOError:
             raise archive.busy(self.run) from None
         except OSError as error:
@@ -61,7 +61,7 @@ class Restart:
     def keep(self, content: dict[str, Any]) -> None:
         """Replace the file; the lock goes on with the new one."""
         assert self._fd is not None
-        with files.fresh(self.path) as new:
+        with safe.fresh(self.path) as new:
             np.savez(new, **content)
             held = os.dup(new.fileno())
         os.close(self._fd)
@@ -76,13 +76,13 @@ class Restart:
     def close(self, done: bool = False) -> None:
         """Give the lock back; of a run that is done, or has kept nothing, no file is left."""
         if self._fd is not None:
-            files.release(self._fd, self.path if done or not os.fstat(self._fd).st_size else None)
+            safe.release(self._fd, self.path if done or not os.fstat(self._fd).st_size else None)
 
 
 def read_restart(path: Path) -> dict[str, Any]:
     """What a restart file says, arrays by name; ValueError if it is damaged."""
     try:
-        with open(files.opened(path), "rb") as file, np.load(file, allow_pickle=False) as kept:
+        with open(safe.opened(path), "rb") as file, np.load(file, allow_pickle=False) as kept:
             return {name: kept[name] for name in kept.files}
     except (*DAMAGE, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
         raise ValueError(f"{path} is damaged; {FROM_THE_BEGINNING}: {error}") from None

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import Cut, Frame
 from discs.problem import Problem
+from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
-from discs.system import RollingDiscs
-from discs.trust import SUSPECTED, Watch, converging
 from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which it is said, if kernels are not read from the cache

@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import stencils
-from discs.chain import Chain
+from discs.chains import stencils
+from discs.chains.chain import Chain
+from discs.chains.rolling_discs import RollingDiscs, folded
+from discs.chains.springs import LinearCurvature, TrueCurvature
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Load, Placed
-from discs.springs import LinearCurvature, TrueCurvature
-from discs.system import RollingDiscs, folded
 
 
 class SlavedSystem(RollingDiscs):
-    """The equations of motion of a `Chain`; a shape is its links, (3, n_links). The springs are those of `discs.springs`."""
+    """The equations of motion of a `Chain`; a shape is its links, (3, n_links). The springs are those of `discs.chains.springs`."""
 
     rows = ("x", "y", "theta")
 

@@ -28,10 +28,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import stencils
-from discs.chain import SteeredChain
+from discs.chains import stencils
+from discs.chains.chain import SteeredChain
+from discs.chains.rolling_discs import Assembly, RollingDiscs, folded
 from discs.skew import Load, Placed
-from discs.system import Assembly, RollingDiscs, folded
 
 
 class Links(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
-from discs.chain import Chain, SteeredChain
+from discs.chains.chain import Chain, SteeredChain
 from discs.problem import Problem, State
 
 PAPER = {

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from compare.hard_runs import EXPLICIT, FRAMES, PEERS, Found, march, motion, peer, posed, processor
+from compare.hardcases.runs import EXPLICIT, FRAMES, PEERS, Found, march, motion, peer, posed, processor
 from compare.lump import lump
 from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.dispersion import frequency, growth, symbols
 from continuum.exact import ring, standing_wave
 from continuum.scenes import SCENES
 from discs import Leapfrog, Problem, Solution, State
-from discs.marching import March
+from discs.running.time_loop import March
 from discs.simulation import lost_energy
 
 # Functions of arguments that can be sent to other processes

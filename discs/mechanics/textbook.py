@@ -8,7 +8,7 @@ part and the forces along the direction the first.
 * J. I. Neimark, N. A. Fufaev, Dynamics of Nonholonomic Systems, AMS 1972: knife edge, disc, sleigh;
 * A. M. Bloch, Nonholonomic Mechanics and Control, 2nd ed., Springer 2015, chapter 1: the same, and the particle.
 
-Oscillators that drive one another are in `discs.oscillators`.
+Oscillators that drive one another are in `discs.mechanics.oscillators`.
 """
 
 from collections.abc import Callable

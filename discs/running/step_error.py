@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import FixedStep, Tally, Work
 from discs.skew import Phase
-from discs.system import RollingDiscs
 
 EVERY = 50  # steps, of which one is compared
 MOST = 8  # steps compared in a run

@@ -7,13 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from discs import checks, poses
-from discs.chain import SteeredChain
+from discs import checks
+from discs.chains.chain import SteeredChain
 from discs.mechanics import Trajectory
+from discs.mechanics.vakonomic import of_chain, rolling_disc, solve
+from discs.pictures import geometry
+from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED
 from discs.problem import Problem, State
 from discs.solution import Solution
-from discs.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED
-from discs.vakonomic import of_chain, rolling_disc, solve
 
 
 def given_or_new(ax: Axes | None, width: float, height: float) -> Axes:
@@ -62,11 +63,11 @@ def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int 
     radius : half the length of a bar; None draws an eighteenth of the rod.
     """
     ax = given_or_new(ax, 6.4, 4.8)
-    frames = poses.instants(run, checks.whole("instants", instants, 1))
-    shown = poses.picked(run.s, checks.whole("discs", discs, 1))
-    size = poses.drawn_radius(run, radius)
-    forward = poses.turn(poses.axles(run))
-    ring = poses.is_ring(run)
+    frames = geometry.instants(run, checks.whole("instants", instants, 1))
+    shown = geometry.picked(run.s, checks.whole("discs", discs, 1))
+    size = geometry.drawn_radius(run, radius)
+    forward = geometry.turn(geometry.axles(run))
+    ring = geometry.is_ring(run)
     for f, shade in zip(frames, np.linspace(0.25, 1, frames.size), strict=True):
         r = np.stack([run.x[f], run.y[f]])
         line = np.append(r, r[:, :1], axis=1) if ring else r
@@ -115,7 +116,7 @@ def profiles(run: Solution, name: str = "theta", ax: Axes | None = None, instant
     """theta or omega along the rod at several times, later ones darker."""
     ax = given_or_new(ax, 5.4, 4.0)
     values = getattr(run, checks.choice("name", name, ("theta", "omega")))
-    frames = poses.instants(run, checks.whole("instants", instants, 1))
+    frames = geometry.instants(run, checks.whole("instants", instants, 1))
     for f, shade in zip(frames, np.linspace(0.25, 1, frames.size), strict=True):
         ax.plot(run.s, values[f], color=BLUE, alpha=shade, label=f"t = {run.t[f]:.3g}")
     ax.set_xlabel(LABEL["s"])

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from compare.hard_problems import collapse, folding, lumped, parasite, rough, rounding, torsion_wave, twisted, waves
-from compare.hard_runs import CONSERVING, FIXED, GAUSS, OURS, PEERS, Expectation, Found, motion
+from compare.hardcases.problems import collapse, folding, lumped, parasite, rough, rounding, torsion_wave, twisted, waves
+from compare.hardcases.runs import CONSERVING, FIXED, GAUSS, OURS, PEERS, Expectation, Found, motion
 from discs import Problem
 
 
@@ -140,7 +140,7 @@ def cases(quick: bool = False) -> list[Case]:
         add("rounding", f"N = {n}", what, exactly(words, energy=1e-9, error=1e-6), run, methods=(*FIXED, *PEERS))
 
     run = partial(motion, partial(twisted, 65, duration=9.0, twist=1.0), note=folding)
-    words = "the equations go on: energy to 1e-10 (real discs would touch, see discs.contact)"
+    words = "the equations go on: energy to 1e-10 (real discs would touch, see discs.mechanics.contact)"
     add(
         "folded line",
         "N = 65, 1 turn, t = 9",

@@ -14,9 +14,9 @@ import numpy as np
 
 from compare import figures
 from compare.background import background
-from compare.hard_cases import Case, cases
-from compare.hard_problems import Growth, rolling_waves
-from compare.hard_runs import OURS, PEERS, RTOL, TOL, Found
+from compare.hardcases.cases import Case, cases
+from compare.hardcases.problems import Growth, rolling_waves
+from compare.hardcases.runs import OURS, PEERS, RTOL, TOL, Found
 from compare.sweeps import Result, read, sweep
 from discs import checks
 
@@ -26,7 +26,7 @@ MARK = {"holds": "holds", "says so": "says so", "lost": "LOST", "refused": "refu
 
 
 class Row(NamedTuple):
-    """One method on one case: see `compare.hard_runs.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or "" of
+    """One method on one case: see `compare.hardcases.runs.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or "" of
     peers and where nothing was seen."""
 
     case: str
@@ -152,7 +152,7 @@ def stability(
     Parameters
     ----------
     quick : small cases only, less than a minute.
-    names : of the cases, as `compare.hard_cases` has them; all by default.
+    names : of the cases, as `compare.hardcases.cases` has them; all by default.
     methods : names of ours and of peers; all by default.
     seconds : of a processor; a run that is foretold to take longer is cut off; 60, or 1 if quick. Peers are given 2 at most.
     executor : as for `sweep`; by default one process beside this one, so that times mean something.

@@ -1,8 +1,9 @@
 """A page to turn and play runs in three dimensions: one file, no network, for a browser or a notebook.
 
-The page holds three.js, the frames as base64 of 32-bit floats, little-endian, frame after frame, and a script; see `discs/data`.
+The page holds three.js, the frames as base64 of 32-bit floats, little-endian, frame after frame, and a script; see
+`discs/pictures/data`.
 Between frames positions and angles are interpolated linearly in time, but where frames are so far apart that this would mislead
-(`poses.off_between_frames`): then frames are shown one by one, and the page says so.
+(`geometry.off_between_frames`): then frames are shown one by one, and the page says so.
 
 Data cannot become code: every "<" of them is written as an escape, and a content security policy lets the browser run the page's
 two scripts, known by their hashes, and load nothing. The page is ASCII, so that the hashes hold whatever encoding a browser
@@ -23,9 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from discs import checks, poses
+from discs import checks
+from discs.pictures import geometry
+from discs.pictures.style import BLUE, GREY, GROUND, INK, LABEL, ORANGE, SIGNED, UNSIGNED
 from discs.solution import Solution
-from discs.style import BLUE, GREY, GROUND, INK, LABEL, ORANGE, SIGNED, UNSIGNED
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ def view(
     titles = list(titles) or [_title(r) for r in runs]
     if len(titles) != len(runs):
         raise ValueError(f"titles must be one for each of the {len(runs)} runs; got {len(titles)}")
-    size = poses.drawn_radius(run, radius)
+    size = geometry.drawn_radius(run, radius)
     about = checks.whole("discs", discs, 2)
     data = {
         "runs": [_data(r, title, about, size) for r, title in zip(runs, titles, strict=True)],
@@ -129,7 +131,7 @@ def _hash(part: str) -> str:
 
 
 def _data_file(name: str) -> str:
-    return files("discs").joinpath("data", name).read_text(encoding="utf-8")
+    return files("discs").joinpath("pictures", "data", name).read_text(encoding="utf-8")
 
 
 def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
@@ -139,8 +141,8 @@ def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
         if values is not None and not np.isfinite(values).all():
             frame = int(np.argwhere(~np.isfinite(values))[0, 0])
             raise ValueError(f"a page shows finite values; {name} is not at frame {frame} of {title!r}: view the frames before it")
-    shown = poses.picked(run.s, about)
-    axle, slope = poses.axles(run), poses.slopes(run)
+    shown = geometry.picked(run.s, about)
+    axle, slope = geometry.axles(run), geometry.slopes(run)
     arrays = {
         "x": run.x,
         "y": run.y,
@@ -154,8 +156,8 @@ def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
     return {
         "title": title,
         "n": int(shown.size),
-        "ring": poses.is_ring(run),
-        "held": poses.off_between_frames(run, size) > poses.TOO_FAR,
+        "ring": geometry.is_ring(run),
+        "held": geometry.off_between_frames(run, size) > geometry.TOO_FAR,
         "t": run.t.tolist(),
         "energy": run.energy.tolist(),
         "drift": float(np.abs(run.energy - run.energy[0]).max()),

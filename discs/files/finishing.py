@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import archive, files, untrusted
-from discs.framefile import FrameFile
+from discs.files import archive, safe, untrusted
+from discs.files.framefile import FrameFile
 
 
 def outside(file: FrameFile) -> dict[str, NDArray]:
@@ -25,10 +25,10 @@ def outside(file: FrameFile) -> dict[str, NDArray]:
 
 def put_back(path: Path, kept: dict[str, NDArray]) -> None:
     """Make a file again what it was when `outside` gave `kept`; its variables have not changed since."""
-    fd, data, place = files.opened(path, os.O_RDWR), kept["bytes"].tobytes(), 0
+    fd, data, place = safe.opened(path, os.O_RDWR), kept["bytes"].tobytes(), 0
     try:
         for a, b in kept["ends"].tolist():
-            files.write_all(fd, data[place : place + b - a], a)
+            safe.write_all(fd, data[place : place + b - a], a)
             place += b - a
         os.ftruncate(fd, int(kept["ends"][-1, 1]))
         os.fsync(fd)

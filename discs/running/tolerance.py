@@ -11,10 +11,10 @@ from discs import checks
 from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find
 from discs.integrators.composition import Composition
 from discs.integrators.gauss import Gauss
-from discs.marching import SimulationError
 from discs.problem import Problem, State
+from discs.running.suggest import suggest_dt
+from discs.running.time_loop import SimulationError
 from discs.solution import Solution
-from discs.step import suggest_dt
 
 USUAL = 1e-3  # the tolerance where none is given
 LEAST = 1e-12  # the least tolerance: some thousand times the rounding of a position

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import archive, checks, files, untrusted
-from discs.archive import CHECKSUM, COORDINATES, PARAMETERS, QUANTITIES, Header, attributes, dimensions
+from discs import checks
+from discs.files import archive, safe, untrusted
+from discs.files.archive import CHECKSUM, COORDINATES, PARAMETERS, QUANTITIES, Header, attributes, dimensions
 from discs.problem import Problem
 from discs.solution import Solution
 
@@ -43,7 +44,7 @@ class FrameFile:
     """
 
     def __init__(self, path: str | Path, writable: bool) -> None:
-        self._fd = files.opened(path, os.O_RDWR if writable else os.O_RDONLY)
+        self._fd = safe.opened(path, os.O_RDWR if writable else os.O_RDONLY)
         self.path = Path(path)
         try:
             self.size = os.fstat(self._fd).st_size
@@ -161,7 +162,7 @@ class FrameFile:
         )
 
     def _write(self, name: str, f: int, value: NDArray) -> None:
-        files.write_all(self._fd, value.reshape(-1).view(np.uint8).data, self.places[name][0] + f * value.nbytes)
+        safe.write_all(self._fd, value.reshape(-1).view(np.uint8).data, self.places[name][0] + f * value.nbytes)
 
     def _read(self, name: str, f: int | None = None) -> NDArray:
         """A variable, or its frame f, read from the file."""
@@ -202,7 +203,7 @@ class FrameFile:
 
     def same(self) -> bool:
         """Whether the file is still the one at its path."""
-        return files.same(self._fd, self.path)
+        return safe.same(self._fd, self.path)
 
     # What is in the file
 

@@ -41,8 +41,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import null_space
 
 from discs import checks
-from discs.lagrange import frames, lagrange_dalembert
 from discs.mechanics import MechanicalSystem, Trajectory
+from discs.mechanics.lagrange import frames, lagrange_dalembert
 from discs.mechanics.sizes import dense, units
 from discs.problem import Problem
 

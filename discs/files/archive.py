@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import checks, files
-from discs.chain import Chain, SteeredChain
+from discs import checks
+from discs.chains.chain import Chain, SteeredChain
+from discs.files import safe
 from discs.problem import Problem, State
 from discs.solution import Solution
 
@@ -219,7 +220,7 @@ CHECKSUM = "CRC-32 of the frame plus 2**32; 0 where it has not been written"
 
 def named(path: str | Path) -> Path:
     """The file of a run that a path names, links followed; ValueError for another ending or where no file can be."""
-    real = files.target(path)
+    real = safe.target(path)
     if Path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"{path} would be a NetCDF-4 file: its name must end in {', '.join(SUFFIXES)}")
     return real
@@ -247,7 +248,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         yield real
         return
     try:
-        held = files.hold(restart)
+        held = safe.hold(restart)
     except BlockingIOError:
         raise busy(path) from None
     done = None
@@ -255,7 +256,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         yield real
         done = restart
     finally:
-        files.release(held, done)
+        safe.release(held, done)
 
 
 def save(run: Solution, path: str | Path) -> None:
@@ -266,12 +267,12 @@ def save(run: Solution, path: str | Path) -> None:
     ValueError : if the name does not end as those of NetCDF-4 files do, no file can be made there, a run writes to it, or there is
         too little room.
     """
-    from discs.framefile import FrameFile, room
+    from discs.files.framefile import FrameFile, room
 
     rows = recorded(run)
     head = header(run.problem, run.t, run.s, run.stats, run.error_estimate, True)
     shapes = {name: value.shape[1:] for name, value in rows.items()}
-    with replacing(path) as real, files.fresh(real, room(head, shapes)) as new, FrameFile.create(new.name, head, shapes) as file:
+    with replacing(path) as real, safe.fresh(real, room(head, shapes)) as new, FrameFile.create(new.name, head, shapes) as file:
         for f in range(run.t.size):
             file.write(f, {name: value[f] for name, value in rows.items()})
 
@@ -286,7 +287,7 @@ def load(path: str | Path) -> Solution:
     ------
     ValueError : if the file cannot be read, is not a run, is cut off or damaged, or too large for this machine's memory.
     """
-    from discs.framefile import FrameFile
+    from discs.files.framefile import FrameFile
 
     with FrameFile.open(path) as file:
         return file.solution()

@@ -2,7 +2,7 @@
 
 Beside the file `run.nc` stands `run.nc.restart` while the run is not finished: what the integrator remembers, about once a second,
 in a file that replaces the one before. After a kill the run goes on from there and takes the frames since then again, to the same
-bits; see `discs.restart`.
+bits; see `discs.files.restart`.
 """
 
 import hashlib
@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discs import archive, checks, files, untrusted
-from discs.finishing import finish, outside
-from discs.framefile import FrameFile, room
+from discs import checks
+from discs.files import archive, safe, untrusted
+from discs.files.finishing import finish, outside
+from discs.files.framefile import FrameFile, room
+from discs.files.restart import FROM_THE_BEGINNING, Restart
 from discs.integrators import Integrator, from_settings
-from discs.marching import March
 from discs.problem import Problem
-from discs.restart import FROM_THE_BEGINNING, Restart
+from discs.running.time_loop import March
 from discs.solution import Solution
 from discs.warn import warn
 
@@ -166,7 +167,7 @@ class Recording(Rows):
         self.restart.clear()
         head = archive.header(self.problem, self.times, self.problem.chain.s, self.about, self.estimate, False)
         shapes = {name: np.shape(value) for name, value in found.items()}
-        with files.fresh(self.path, room(head, shapes)) as new:
+        with safe.fresh(self.path, room(head, shapes)) as new:
             FrameFile.create(new.name, head, shapes).__exit__()
             if self.path.exists():
                 raise ValueError(f"{self.path} was made by something else while the run began; give another path")
@@ -256,7 +257,7 @@ def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> 
     ValueError if it was made for another tolerance.
     """
     if not (real := archive.named(path)).exists():
-        files.check_writable(path)
+        safe.check_writable(path)
         return None
     restart = Restart(real)
     try:

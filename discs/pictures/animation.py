@@ -19,9 +19,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from discs import checks, poses
+from discs import checks
+from discs.pictures import geometry
+from discs.pictures.style import BLUE, GREY, GROUND, INK, ORANGE, PALE
 from discs.solution import Solution
-from discs.style import BLUE, GREY, GROUND, INK, ORANGE, PALE
 
 KINDS = (".mp4", ".gif")
 ROUND = np.linspace(0, 2 * np.pi, 33)
@@ -110,16 +111,16 @@ class Stage:
         elevation: float = 28.0,
         size: tuple[int, int] = (1280, 720),
     ) -> None:
-        self.run, self.radius = run, poses.drawn_radius(run, radius)
-        self.shown = poses.picked(run.s, checks.whole("discs", discs, 1))
+        self.run, self.radius = run, geometry.drawn_radius(run, radius)
+        self.shown = geometry.picked(run.s, checks.whole("discs", discs, 1))
         self.size = (checks.whole("width", size[0], 16), checks.whole("height", size[1], 16))
         if self.size[0] % 2 or self.size[1] % 2:
             raise ValueError(f"size must be even numbers of pixels, as video takes; got {size}")
         a, e = np.radians([checks.number("azimuth", azimuth), checks.number("elevation", elevation)])
         self._toward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
         self._screen = np.array([[-np.sin(a), np.cos(a), 0.0], [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]])
-        self._forward = poses.turn(poses.axles(run))
-        self._line = np.arange(run.s.size + poses.is_ring(run)) % run.s.size
+        self._forward = geometry.turn(geometry.axles(run))
+        self._line = np.arange(run.s.size + geometry.is_ring(run)) % run.s.size
         contacts = np.stack([run.x[:, self.shown], run.y[:, self.shown], np.zeros((run.t.size, self.shown.size))], axis=-1)
         self._tracks = self._flat(contacts).swapaxes(0, 1)
         self._set_up()

@@ -19,9 +19,9 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
-from discs import stencils
-from discs.chain import Chain
-from discs.system import Assembly, folded
+from discs.chains import stencils
+from discs.chains.chain import Chain
+from discs.chains.rolling_discs import Assembly, folded
 
 
 class LinearCurvature:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from discs import checks, stencils
+from discs import checks
+from discs.chains import stencils
 
 ROLLING = ("field", "unit")
 CURVATURE = ("linear", "true")
@@ -53,7 +54,7 @@ class Chain(Spaced):
 
     and disc i moves by r_i' = e_i omega_i, with e_i = R J r'_i ("field", the paper's (constraints)) or
     e_i = R J r'_i/|r'_i| ("unit", (constraintsphi)); J turns by +90 degrees. The stencils of r' and r'' are in
-    `discs.stencils`.
+    `discs.chains.stencils`.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ class SteeredChain(Spaced):
     """A chain of `n` vertical rolling discs that each have a heading of their own, joined by flexible beams.
 
     A disc's configuration is (x, y, theta, phi), phi the direction of its axle; it rolls along J (cos phi, sin phi). A link between
-    neighbours resists stretch, shear, torsion and bending; see `discs.steered` for the energy.
+    neighbours resists stretch, shear, torsion and bending; see `discs.chains.steered` for the energy.
 
     Parameters
     ----------

@@ -15,8 +15,8 @@ from compare.peers import reduced
 from compare.precision import reference
 from discs import Problem, SimulationError, Solution, simulate, suggest_dt
 from discs.integrators import Integrator
+from discs.running.tolerance import to_tolerance
 from discs.simulation import LOST
-from discs.tolerance import to_tolerance
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")

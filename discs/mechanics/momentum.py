@@ -66,7 +66,7 @@ def symmetry_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: Ar
     ----------
     system : with a `symmetry`.
     t : (F,), times, at least 4.
-    q, v : (F, m), a motion: of `MechanicalSystem.integrate`, or of a run by `discs.lagrange.frames`.
+    q, v : (F, m), a motion: of `MechanicalSystem.integrate`, or of a run by `discs.mechanics.lagrange.frames`.
 
     Returns
     -------

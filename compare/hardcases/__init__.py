@@ -1,0 +1,1 @@
+"""Hard cases: what each method survives, and where it fails."""

@@ -1,0 +1,1 @@
+"""Chains of rolling discs: their parameters, springs and equations of motion."""

@@ -1,0 +1,1 @@
+"""A run on its way: the time loop, what is recorded, the step, the error."""
