@@ -8,6 +8,7 @@ from continuum import solve, untwisting_rod
 from discs import simulate
 
 
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 @pytest.mark.parametrize("multiple", [1, 4, 16])
 def test_midpoint_keeps_the_energy(multiple):
     problem = lump(untwisting_rod(duration=150.0), 129, "consistent")

@@ -95,6 +95,7 @@ def test_nearer_discs_are_drawn_later():
     assert np.all(np.diff([rim[1] for rim in rims]) < 0)  # and lower
 
 
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 def test_a_ring_is_closed_and_few_of_many_discs_are_drawn():
     ring = simulate(uneven(40, Model("ring", "field")), dt=0.05, frames=2, progress=False)
     stage = Stage(ring, discs=8, size=(320, 180))

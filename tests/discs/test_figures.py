@@ -30,12 +30,14 @@ assert "matplotlib.pyplot" not in sys.modules
 # ---- poses
 
 
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 def test_slopes_from_positions_are_those_of_the_chain(ends, rolling):
     recorded, bare = run_of(ends, rolling, want=("slope",)), run_of(ends, rolling)
     inner = slice(None) if ends in ("springs", "paper", "ring") else slice(1, -1)  # a ghost disc is not known here
     np.testing.assert_allclose(geometry.slopes(bare)[..., inner], geometry.slopes(recorded)[..., inner], rtol=0, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 def test_axles_are_across_the_velocity(ends, rolling):
     run = run_of(ends, rolling, want=("slope", "velocity"))
     axle, rate = geometry.axles(run), np.stack([run.x_rate, run.y_rate], axis=1)
@@ -45,6 +47,7 @@ def test_axles_are_across_the_velocity(ends, rolling):
     assert (np.sign((geometry.turn(axle) * rate).sum(axis=1)) == np.sign(run.omega)).all()
 
 
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 def test_axles_of_own_headings():
     run = run_of(law="steered")
     np.testing.assert_array_equal(geometry.axles(run), np.stack([np.cos(run.phi), np.sin(run.phi)], axis=1))

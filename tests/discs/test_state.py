@@ -82,6 +82,7 @@ def test_a_field_gives_the_state_of_its_nodes():
     np.testing.assert_array_equal(state.phi_rate, field.phi_rate[-1])
 
 
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 def test_slices_of_a_run(tmp_path):
     want = ("velocity", "slope", "contact_force")
     run = simulate(uneven(5, STEERED[0]), dt=0.1, frames=9, want=want, engine="plain", progress=False)
