@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from tqdm import tqdm
 
 from continuum import Rod, Scene, breathing_ring, exact, solve, stepping, untwisting_rod
 from continuum.galerkin import SpectralRod
-from continuum.spectral import Course
+from continuum.spectral import Course, Search
 from continuum.stepping import Steps, stages_for
 from discs import SimulationError
 from discs.kernels import limits
@@ -155,3 +156,24 @@ def test_a_motion_that_is_too_fast_is_named():
     scene = Scene(rod=untwisting_rod().rod, initial=fast, duration=1.0)
     with pytest.raises((SimulationError, ValueError), match="too fast"):
         solve(scene, 1e-3, progress=False)
+
+
+@pytest.mark.parametrize("stages", [4, 12])
+def test_a_step_s_error_is_its_highest_coefficient(stages):
+    """Rates g P_{s-1} in theta give the coefficient h g/(2 (2s - 1)) of degree s. Tolerances follow the order s/2."""
+    steps = Steps(SpectralRod(untwisting_rod(), 19), 4.5, 1e-4, stages, 0.3)
+    v = np.zeros((stages, 3, 19))
+    x, _ = np.polynomial.legendre.leggauss(stages)
+    v[:, 2] = 0.7 * np.polynomial.legendre.Legendre.basis(stages - 1)(x)[:, None]
+    assert steps._error(v, 0.3) == pytest.approx(0.3 * 0.7 / (2 * (2 * stages - 1)), rel=1e-9)
+    assert stepping.finer(1e-5, stages) == pytest.approx(1e-5 / min(1.5 ** (stages / 2 + 1), 8))
+    assert stepping.coarser(stepping.finer(1e-5, stages), stages) == pytest.approx(1e-5)
+
+
+def test_what_functions_miss_of_the_start_is_estimated():
+    """Though two motions do not differ."""
+    search = Search(untwisting_rod(), {"theta": 1e-3}, np.array([4.5]), tqdm(disable=True))
+    found = search.course.run(19, 1e-3)
+    missed = found._replace(start=found.start | {"omega": 0.7})
+    assert search._reached(missed, found._replace(tolerance=1e-4))
+    assert search.estimate["omega"] == 0.7
