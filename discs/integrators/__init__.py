@@ -7,7 +7,7 @@ from typing import Any
 from discs import checks
 from discs.integrators.base import FixedStep, Integrator, OneStep, Work
 from discs.integrators.composition import KahanLi6, Suzuki4
-from discs.integrators.gauss import Gauss4, Gauss6, Gauss8
+from discs.integrators.gauss import Gauss, Gauss4, Gauss6, Gauss8
 from discs.integrators.ivp import BDF, DOP853, LSODA, RK45, Radau
 from discs.integrators.leapfrog import Leapfrog
 from discs.integrators.midpoint import Midpoint
@@ -58,6 +58,7 @@ __all__ = [
     "RK4",
     "RK45",
     "FixedStep",
+    "Gauss",
     "Gauss4",
     "Gauss6",
     "Gauss8",
