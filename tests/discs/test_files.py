@@ -67,7 +67,7 @@ def test_the_second_of_two_runs_on_a_path_is_refused(tmp_path, capsys):
 
 
 WITHOUT_LOCKS = (
-    "import sys; from discs import files; from discs.__main__ import main; safe.fcntl = None; sys.exit(main(sys.argv[1:]))"
+    "import sys; from discs.files import safe; from discs.__main__ import main; safe.fcntl = None; sys.exit(main(sys.argv[1:]))"
 )
 
 
@@ -307,7 +307,8 @@ def test_other_endings_are_refused(name, tmp_path, capsys):
 
 def test_what_a_kill_leaves_of_a_save_is_removed_by_the_next(tmp_path):
     code = (
-        "import os, sys, signal; from discs import framefile, simulate; from discs.chains.twist import untwisting_chain;"
+        "import os, sys, signal; from discs import simulate; from discs.files import framefile;"
+        "from discs.chains.twist import untwisting_chain;"
         "run = simulate(untwisting_chain(5), dt=0.5, frames=2, engine='plain', progress=False);"
         "framefile.FrameFile.write = lambda *a: os.kill(os.getpid(), signal.SIGKILL); run.save(sys.argv[1])"
     )

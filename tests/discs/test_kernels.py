@@ -11,20 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from discs import (
-    Chain,
-    Gauss6,
-    Midpoint,
-    Problem,
-    State,
-    marching,
-    recording,
-    simulate,
-)
+from discs import Chain, Gauss6, Midpoint, Problem, State, simulate
 from discs.integrators import METHODS
 from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
 from discs.kernels import banded, blocks, compiled, steered_links
+from discs.running import recording, time_loop
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 
 COMPILED = SLAVED + STEERED
@@ -204,8 +196,8 @@ class Compiling(Midpoint):
 def test_compiling_is_announced_once(method, progress, monkeypatch, capsys):
     problem = uneven(5, Model("springs", "field"))
     simulate(problem, dt=0.5, frames=1, progress=False)  # all others are compiled
-    monkeypatch.setattr(marching, "_PREPARED", set())
-    monkeypatch.setattr(marching, "NOTICE", 0.01)
+    monkeypatch.setattr(time_loop, "_PREPARED", set())
+    monkeypatch.setattr(time_loop, "NOTICE", 0.01)
     for _ in range(2):
         simulate(problem, method, 0.5, 1, progress=progress)
     said = capsys.readouterr().err.count("compiling 'midpoint', once on this machine")
@@ -236,7 +228,7 @@ print([(w.filename, w.lineno, str(w.message)[:31]) for w in told], tiny.twice(21
 @pytest.mark.parametrize("folder", ["", "cache", "nowhere/cache"])
 def test_without_a_folder_for_the_cache(folder, tmp_path):
     """A read-only package and no home: __pycache__ is a file, which stops root too."""
-    shutil.copytree(Path(marching.__file__).parent, tmp_path / "discs", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(Path(compiled.__file__).parents[1], tmp_path / "discs", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "discs" / "kernels" / "__pycache__").touch()
     (tmp_path / "discs" / "kernels" / "tiny.py").write_text(TINY)
     (tmp_path / "nowhere").touch()
@@ -271,7 +263,7 @@ EACH = [METHODS[name]() for name in ("midpoint", "suzuki4", "gauss6", "mclachlan
 )
 def test_ctrl_c_is_heard_within_a_compiled_call(method, h, frame, monkeypatch):
     """A call of many steps, a step of many sweeps and a frame between steps would all take some ten seconds of the processor."""
-    monkeypatch.setattr(marching, "CHUNK", 10**12)
+    monkeypatch.setattr(time_loop, "CHUNK", 10**12)
     problem = uneven(1000, Model("springs", "field"))
     simulate(problem, type(method)(), 1e-8, [1e-8, 1.5e-8], progress=False)  # compiled
     press, started = pressing(0.3), time.process_time()
@@ -284,7 +276,7 @@ def test_ctrl_c_is_heard_within_a_compiled_call(method, h, frame, monkeypatch):
 @pytest.mark.parametrize(("sweeps", "steps"), [(600, 400), (60_000, 2.5)], ids=["many-steps", "a-frame-between-steps"])
 def test_ctrl_c_within_a_call_keeps_a_checkpoint(sweeps, steps, tmp_path, monkeypatch):
     """The call is dropped, the memory is that of before, and the run goes on from there to the same bits."""
-    monkeypatch.setattr(marching, "CHUNK", 10**12)
+    monkeypatch.setattr(time_loop, "CHUNK", 10**12)
     problem, h, path = uneven(100, Model("springs", "field")), 1e-3, tmp_path / "run.nc"
     settled = {"method": Midpoint(sweeps=sweeps, tolerance=0), "dt": h, "frames": np.array([0, h, steps * h]), "progress": False}
     simulate(problem, Midpoint(), h, [h, 1.5 * h], progress=False)  # compiled
