@@ -19,7 +19,7 @@ def compile_for(law: str) -> None:
     own = law == "own"
     values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + OWN if own else ONES, 1.0)
     chain: Chain | SteeredChain = SteeredChain(**values) if own else Chain(**values)
-    problem = Problem(chain, State(chain.s, 0 * chain.s, chain.s, phi=0 * chain.s if own else None), 0.01)
+    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if own else None), 0.01)  # at rest
     for name in ("midpoint", "gauss6", "rk4", "leapfrog", "mclachlan-perlmutter", "RK45"):
         simulate(problem, METHODS[name](), 0.005, frames=1, progress=False)
         print(f"discs with {law} headings: {OF.get(name, name)} compiled", flush=True)
