@@ -251,7 +251,8 @@ def _conserving(system: "MechanicalSystem", path: Trajectory) -> bool:
         step = 1e-5 * np.abs(path.q).max() / max(float(np.abs(v).max()), 1e-300)
         rise = (system.energy(q + step * v, v) - system.energy(q - step * v, v)) / (2 * step)
         power = float(v @ system.force(q, v))
-        if abs(power + rise) > 1e-3 * (abs(power) + abs(rise)) + 1e-6 * np.abs(path.energy).max() / step * 1e-5:
+        rounding = 1e-11 * np.abs(path.energy).max() / step
+        if abs(power + rise) > 1e-3 * (abs(power) + abs(rise)) + rounding:
             return False
     return True
 

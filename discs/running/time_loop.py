@@ -232,7 +232,7 @@ class March:
     def _lost(self, before: Any, after: Placed, h: float, by_velocity: bool) -> int | None:
         """A disc that lost its heading on the straight way from memory `before` to `after`, or that its velocity pointed.
 
-        The velocity tells where a step did not converge, so that where it leads means nothing, and in explicit steps, whose stages
+        The velocity tells where a step did not converge, as its end is then undefined, and in explicit steps, whose stages
         jump to and fro across r' = 0. (Converged steps may be long beside the time of a wave: there it would tell wrong.)
         """
         lost = self.system.lost_heading(before, after)
