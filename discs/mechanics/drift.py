@@ -7,16 +7,13 @@ whatever the path: Gauss's formula on the straight line from q_n to q_{n+1}. It 
 A^T.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from discs.mechanics import saddle
-from discs.mechanics.sizes import Sizes, dense, residual_size
-
-if TYPE_CHECKING:
-    from discs.mechanics.system import MechanicalSystem
+from discs.mechanics.equations import Equations
+from discs.mechanics.saddle import dense
+from discs.mechanics.sizes import Sizes, residual_size
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 EPS = float(np.finfo(float).eps)
@@ -30,7 +27,7 @@ class Drift:
     off : drift of the functions c_a behind the closed rows, (number of closed rows,).
     """
 
-    def __init__(self, system: "MechanicalSystem", sizes: Sizes) -> None:
+    def __init__(self, system: Equations, sizes: Sizes) -> None:
         self.system, self.sizes, self.m = system, sizes, sizes.m
         self.rows = self._closed()
         self.off = np.zeros(int(self.rows.sum()))

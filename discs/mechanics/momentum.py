@@ -32,7 +32,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from discs.mechanics import MechanicalSystem
-from discs.mechanics.sizes import dense, units
+from discs.mechanics.saddle import dense
+from discs.mechanics.sizes import units
 
 RANK = 1e-9  # singular values of N, with rows and columns of norm 1, below this count as 0
 

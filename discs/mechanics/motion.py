@@ -11,7 +11,7 @@ reason.
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
@@ -19,13 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
 from discs.mechanics.drift import Drift
+from discs.mechanics.equations import Equations
 from discs.mechanics.rank_drops import RankDrops
 from discs.mechanics.sizes import Sizes, residual_size
 from discs.mechanics.stiffness import Stiffness
 from discs.warn import warn
-
-if TYPE_CHECKING:
-    from discs.mechanics.system import MechanicalSystem
 
 METHODS = ("auto", "DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 EXPLICIT = ("DOP853", "RK45", "RK23")  # of one step: the state can be corrected after each
@@ -58,7 +56,7 @@ class Trajectory:
 class Rate:
     """d/dt of (q, v, mu). Where it has no finite value it is nan, so that steps get shorter, and `trouble` says why."""
 
-    def __init__(self, system: "MechanicalSystem") -> None:
+    def __init__(self, system: Equations) -> None:
         self.system, self.m = system, len(system.names)
         self.trouble, self.evaluations = "", 0
 
@@ -76,7 +74,7 @@ class Rate:
 
 
 def integrate(
-    system: "MechanicalSystem",
+    system: Equations,
     q: NDArray,
     v: NDArray,
     mu: NDArray | None,
@@ -114,7 +112,7 @@ def integrate(
     return path
 
 
-def _within_reach(system: "MechanicalSystem", rtol: float) -> float:
+def _within_reach(system: Equations, rtol: float) -> float:
     """A tolerance that the derivatives of formulas allow, with a warning where it is not the one asked for."""
     error, name = max(((f.error, f.name) for f in system.formulas), default=(0.0, ""))
     if error <= 10 * rtol:
@@ -127,7 +125,7 @@ def _within_reach(system: "MechanicalSystem", rtol: float) -> float:
 
 
 def _follow(
-    system: "MechanicalSystem",
+    system: Equations,
     start: NDArray,
     times: NDArray,
     method: str,
@@ -224,7 +222,7 @@ def _reason(solver: Any, rate: Rate, ranks: RankDrops, said: str | None) -> str:
     return f"steps have come down to {abs(solver.step_size):.1g}; take a larger rtol, or a method for stiff problems"
 
 
-def _trajectory(system: "MechanicalSystem", t: NDArray, found: NDArray, charged: bool, stats: dict[str, Any]) -> Trajectory:
+def _trajectory(system: Equations, t: NDArray, found: NDArray, charged: bool, stats: dict[str, Any]) -> Trajectory:
     m = len(system.names)
     path, speed, charges = np.split(found, [m, 2 * m], axis=1)
     multipliers = np.full((t.size, len(system.owners)), np.nan)
@@ -242,7 +240,7 @@ def _trajectory(system: "MechanicalSystem", t: NDArray, found: NDArray, charged:
     return Trajectory(t, path, speed, multipliers, energy, residual, charges if charged else None, stats)
 
 
-def _conserving(system: "MechanicalSystem", path: Trajectory) -> bool:
+def _conserving(system: Equations, path: Trajectory) -> bool:
     """Whether the forces are those of L, which do not change the energy: v.f + d(v.Mv/2 + V)(v) = 0 with v held, at all frames.
 
     A `force` that a user put in place of that of L may damp or drive.
@@ -257,7 +255,7 @@ def _conserving(system: "MechanicalSystem", path: Trajectory) -> bool:
     return True
 
 
-def _watch(system: "MechanicalSystem", path: Trajectory) -> None:
+def _watch(system: Equations, path: Trajectory) -> None:
     """Warn where energy is lost or gained, or a constraint left."""
     method, cure = path.stats["method"], f"the motion may not be trusted; take a smaller rtol than {path.stats['rtol']:g}"
     kinetic = np.array([0.5 * v @ (system.mass(q) @ v) for q, v in zip(path.q, path.v, strict=True)])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
 from discs.mechanics import MechanicalSystem
-from discs.mechanics.textbook import Textbook, finite, positive
+from discs.mechanics.known import Textbook, finite, positive
 
 
 def contact_oscillator(

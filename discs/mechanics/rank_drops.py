@@ -14,18 +14,16 @@ shorter. Other rows have the errors of the steps; a motion that misses by more t
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
 from discs.mechanics.drift import Drift
-from discs.mechanics.sizes import Sizes, dense
-
-if TYPE_CHECKING:
-    from discs.mechanics.motion import Rate
-    from discs.mechanics.system import MechanicalSystem
+from discs.mechanics.equations import Equations
+from discs.mechanics.saddle import dense
+from discs.mechanics.sizes import Sizes
 
 SMOOTH = 1e-5  # most that two ways over a moment may differ, relative to each quantity's size
 MISS = 1e-9  # relative; initial data with nine digits still meet the place where ways part
@@ -48,7 +46,7 @@ class RankDrops:
     owners : whose rows become dependent, in words.
     """
 
-    def __init__(self, system: "MechanicalSystem", sizes: Sizes, drift: Drift) -> None:
+    def __init__(self, system: Equations, sizes: Sizes, drift: Drift) -> None:
         self.system, self.sizes, self.drift, self.m = system, sizes, drift, sizes.m
         self.norms = np.zeros(len(system.owners))
         self.watched = 0 < len(system.owners) * len(system.names) <= LARGEST
@@ -76,7 +74,7 @@ class RankDrops:
             "large to tell which is its own; take a smaller rtol, or stop before"
         )
 
-    def passage(self, rate: "Rate", solver: Any, direction: float, rtol: float) -> Passage | None:
+    def passage(self, rate: Callable[[float, NDArray], NDArray], solver: Any, direction: float, rtol: float) -> Passage | None:
         """A step over a moment of dependent rows less than a step away; None if there is none, or no smooth way over it."""
         if not self.watched:
             return None
@@ -122,7 +120,9 @@ class RankDrops:
         return self.sigma / falls if falls > 0 else np.inf
 
 
-def _steps(rate: "Rate", y: NDArray, times: tuple[float, ...]) -> tuple[NDArray, Callable[[float], NDArray]]:
+def _steps(
+    rate: Callable[[float, NDArray], NDArray], y: NDArray, times: tuple[float, ...]
+) -> tuple[NDArray, Callable[[float], NDArray]]:
     """DOP853 by given steps, whatever their error."""
     for a, b in pairwise(times):
         most = 1e6 * (1 + np.abs(y).max())

@@ -15,6 +15,11 @@ SINGULAR = 1e-12  # pivots and ranks below this, relative to the largest, are lo
 ASYMMETRY = 1e-10  # of M, relative to the root of both diagonal entries
 
 
+def dense(a: Any) -> NDArray:
+    """An array of what may be sparse."""
+    return a.toarray() if scipy.sparse.issparse(a) else np.asarray(a)
+
+
 def matrix(m: Any, a: Any) -> Any:
     """[[M, A^T], [A, 0]] of m (k, k) and a (c, k), sparse if A is."""
     if not scipy.sparse.issparse(a):
@@ -72,7 +77,7 @@ def symmetric(m: Any, names: Sequence[str]) -> None:
     off = abs(m - m.T)
     if not off.max() > 0:
         return
-    off, size = (off.toarray() if scipy.sparse.issparse(off) else off), np.sqrt(np.abs(diagonal))
+    off, size = dense(off), np.sqrt(np.abs(diagonal))
     scale = np.outer(size, size)
     off = off / np.where(scale > 0, scale, abs(m).max())
     if off.max() > ASYMMETRY:
@@ -132,7 +137,7 @@ def _inertia(m: Any, a: Any, names: Sequence[str], d: NDArray | None = None) -> 
     kernel = scipy.linalg.null_space(a.toarray()) if a.shape[0] else np.eye(len(names))
     if not kernel.size:
         return
-    scaled = (m.toarray() if scipy.sparse.issparse(m) else m) * d * d[:, None]
+    scaled = dense(m) * d * d[:, None]
     sizes, directions = np.linalg.eigh(kernel.T @ (scaled @ kernel))
     if sizes[0] <= SINGULAR * max(sizes[-1], 0.0):
         worst = names[int(np.argmax(np.abs(kernel @ directions[:, 0])))]

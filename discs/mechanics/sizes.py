@@ -4,24 +4,19 @@ A velocity has the size sqrt(2 T/M_kk), T the largest kinetic energy so far; a c
 charge mu_a of the vakonomic equations sqrt(2 T)/|A_a|, |A_a| the row's norm in coordinates of mass 1.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from discs.mechanics.system import MechanicalSystem
+from discs.mechanics.equations import Equations
+from discs.mechanics.saddle import dense
 
 TINY = float(np.finfo(float).tiny)
 
 
-def dense(a: Any) -> NDArray:
-    """An array of what may be sparse."""
-    return a.toarray() if scipy.sparse.issparse(a) else np.asarray(a)
-
-
-def units(system: "MechanicalSystem", q: NDArray) -> NDArray:
+def units(system: Equations, q: NDArray) -> NDArray:
     """1/sqrt(M_kk), (m,): the speed of each coordinate at kinetic energy 1/2.
 
     Of a coordinate without inertia of its own: the largest that the constraints give it at that energy.
@@ -36,7 +31,7 @@ def units(system: "MechanicalSystem", q: NDArray) -> NDArray:
     return np.where(diagonal > 0, 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)), speeds)
 
 
-def residual_size(system: "MechanicalSystem", q: NDArray, v: NDArray) -> NDArray:
+def residual_size(system: Equations, q: NDArray, v: NDArray) -> NDArray:
     """What A v - b is compared with, (c,): the sum of |A_ik| times the size of v_k, and |b|."""
     size = units(system, q) * _norm(system.mass(q), v)
     return abs(system.constraint(q)) @ np.maximum(size, np.abs(v)) + np.abs(system.drive)
@@ -48,7 +43,7 @@ class Sizes:
     unit : (m,), see `units`; speed : sqrt(2 T), the largest so far; shift : (m,), the largest displacement so far.
     """
 
-    def __init__(self, system: "MechanicalSystem", y: NDArray, rate: NDArray, span: float) -> None:
+    def __init__(self, system: Equations, y: NDArray, rate: NDArray, span: float) -> None:
         self.system, self.m, self.start = system, len(system.names), y[: len(system.names)]
         self.unit = units(system, self.start)
         mass = system.mass(self.start)

@@ -1,6 +1,6 @@
 r"""Systems of the nonholonomic literature with known answers, through the same machinery as the discs.
 
-Each function returns a `Textbook`: a `discs.mechanics.MechanicalSystem`, an admissible start and, where there is a closed form, the
+Each function returns a `discs.mechanics.known.Textbook`: a system, an admissible start and, where there is a closed form, the
 motion with its multipliers. All derivations rest on one picture: motion with speed sigma along a direction of angle phi, r. = sigma
 (cos phi, sin phi), has r.. = sigma. (cos phi, sin phi) + sigma phi. (-sin phi, cos phi); the force of constraint gives the second
 part and the forces along the direction the first.
@@ -12,92 +12,14 @@ Oscillators that drive one another are in `discs.mechanics.oscillators`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from discs import checks
-from discs.mechanics import MechanicalSystem, Trajectory
-
-FRAMES = ("t", "q", "v", "multipliers", "energy", "residual")  # of a Trajectory
-
-
-@dataclass(frozen=True, eq=False)
-class Textbook:
-    """A system with a known answer.
-
-    Attributes
-    ----------
-    system : the equations.
-    q, v : (m,), coordinates and velocities at t = 0.
-    exact : t -> (q, v, lambda), the motion in closed form; None if there is none.
-    invariants : functions of q, v that the motion keeps, by name.
-    """
-
-    system: MechanicalSystem
-    q: NDArray
-    v: NDArray
-    exact: Callable[[float], tuple[NDArray, NDArray, NDArray]] | None = None
-    invariants: dict[str, Callable[[NDArray, NDArray], float]] = field(default_factory=dict)
-
-    def integrate(self, times: ArrayLike, rtol: float = 1e-11, **options: Any) -> Trajectory:
-        """The motion of the start at t = 0, at times (F,), increasing, which may lie before and after it.
-
-        `options` as of `MechanicalSystem.integrate`.
-        """
-        t = np.atleast_1d(checks.array("times", times))
-        if t.ndim != 1 or not t.size or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
-            raise ValueError("times must be at least one, increasing; the start is that of t = 0")
-        before, after = t[t < 0][::-1], t[t >= 0]
-        if not before.size and after.size > 1 and after[0] == 0:
-            return self.system.integrate(self.q, self.v, after, rtol, **options)
-        parts = []
-        if before.size:
-            path = self.system.integrate(self.q, self.v, [0.0, *before], rtol, **options)
-            parts.append(_frames(path, slice(None, 0, -1)))
-        if after.size:
-            first = () if after[0] == 0 else (0.0,)
-            # the start alone is the first frame of any motion
-            path = self.system.integrate(self.q, self.v, [*first, *after] if after[-1] > 0 else [0.0, _moment(t)], rtol, **options)
-            parts.append(_frames(path, slice(len(first), len(first) + after.size)))
-        return _joined(parts)
-
-
-def _moment(t: NDArray) -> float:
-    """A short time, for a motion of which only the start is asked for."""
-    return 1e-6 * float(np.abs(t).max()) or 1e-6
-
-
-def _frames(path: Trajectory, part: slice) -> Trajectory:
-    return replace(path, **{name: getattr(path, name)[part] for name in FRAMES})
-
-
-def _joined(parts: list[Trajectory]) -> Trajectory:
-    last = parts[-1]
-    stats = last.stats | {n: sum(p.stats[n] for p in parts) for n in ("steps", "evaluations")}
-    stats["rank_drops"] = sorted(moment for p in parts for moment in p.stats["rank_drops"])
-    return replace(last, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in FRAMES}, stats=stats)
-
-
-def _nonzero(name: str, value: float, why: str) -> float:
-    if checks.number(name, value) == 0:
-        raise ValueError(f"{name} must not be 0 ({why}); got {checks.shown(value)}")
-    return float(value)
-
-
-def positive(**values: float) -> None:
-    """Refuse parameters that are not positive, by name."""
-    for name, value in values.items():
-        checks.number(name, value, positive=True)
-
-
-def finite(**values: float) -> None:
-    """Refuse parameters that are not finite numbers, by name."""
-    for name, value in values.items():
-        checks.number(name, value)
+from discs.mechanics import MechanicalSystem
+from discs.mechanics.known import Textbook, finite, nonzero, positive
 
 
 def _slope_drift(b: float, c: float, phi: float, start: float) -> tuple[float, float]:
@@ -134,7 +56,7 @@ def rolling_disc(
     """
     positive(mass=mass, spin_inertia=spin_inertia, heading_inertia=heading_inertia, radius=radius)
     finite(roll_rate=roll_rate, heading=heading, slope=slope)
-    turn = _nonzero("turn_rate", turn_rate, "the disc then rolls on a straight line")
+    turn = nonzero("turn_rate", turn_rate, "the disc then rolls on a straight line")
     m, a, r, pull = mass, spin_inertia, radius, mass * slope
 
     def constraint(q: NDArray) -> list[list[complex]]:
@@ -185,7 +107,7 @@ def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_
     """
     positive(mass=mass, inertia=inertia)
     finite(slope=slope, speed=speed, heading=heading)
-    turn = _nonzero("turn_rate", turn_rate, "the blade then runs straight")
+    turn = nonzero("turn_rate", turn_rate, "the blade then runs straight")
     pull = mass * slope
     system = MechanicalSystem.from_lagrangian(
         ("x", "y", "phi"),
@@ -227,8 +149,8 @@ def chaplygin_sleigh(
     """
     positive(mass=mass, inertia=inertia)
     finite(speed=speed, heading=heading)
-    a = _nonzero("offset", offset, "a knife edge without slope")
-    turn = _nonzero("turn_rate", turn_rate, "the sleigh then runs straight")
+    a = nonzero("offset", offset, "a knife edge without slope")
+    turn = nonzero("turn_rate", turn_rate, "the sleigh then runs straight")
 
     def metric(q: NDArray) -> NDArray:
         s, c = -mass * a * np.sin(q[2]), mass * a * np.cos(q[2])
@@ -281,7 +203,7 @@ def nonholonomic_particle(mass: float, width: float, *, y: float, velocity: tupl
     positive(mass=mass, width=width)
     finite(y=y)
     velocity = tuple(checks.vector("velocity", velocity, 2).tolist())
-    run = _nonzero("velocity[1]", velocity[1], "the particle then moves on a straight line")
+    run = nonzero("velocity[1]", velocity[1], "the particle then moves on a straight line")
     b = width
     system = MechanicalSystem.from_lagrangian(
         ("x", "y", "z"),

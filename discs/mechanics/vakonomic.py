@@ -43,7 +43,8 @@ from scipy.linalg import null_space
 from discs import checks
 from discs.mechanics import MechanicalSystem, Trajectory
 from discs.mechanics.lagrange import frames, lagrange_dalembert
-from discs.mechanics.sizes import dense, units
+from discs.mechanics.saddle import dense
+from discs.mechanics.sizes import units
 from discs.problem import Problem
 
 FLAT = 1e-9  # of the terms of G mu: a field that is weaker counts as none

@@ -1,0 +1,89 @@
+"""Systems with a known answer: their record, their motion to both sides of the start, and the checks of their parameters."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from discs import checks
+from discs.mechanics import MechanicalSystem, Trajectory
+
+FRAMES = ("t", "q", "v", "multipliers", "energy", "residual")  # of a Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Textbook:
+    """A system with a known answer.
+
+    Attributes
+    ----------
+    system : the equations.
+    q, v : (m,), coordinates and velocities at t = 0.
+    exact : t -> (q, v, lambda), the motion in closed form; None if there is none.
+    invariants : functions of q, v that the motion keeps, by name.
+    """
+
+    system: MechanicalSystem
+    q: NDArray
+    v: NDArray
+    exact: Callable[[float], tuple[NDArray, NDArray, NDArray]] | None = None
+    invariants: dict[str, Callable[[NDArray, NDArray], float]] = field(default_factory=dict)
+
+    def integrate(self, times: ArrayLike, rtol: float = 1e-11, **options: Any) -> Trajectory:
+        """The motion of the start at t = 0, at times (F,), increasing, which may lie before and after it.
+
+        `options` as of `MechanicalSystem.integrate`.
+        """
+        t = np.atleast_1d(checks.array("times", times))
+        if t.ndim != 1 or not t.size or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
+            raise ValueError("times must be at least one, increasing; the start is that of t = 0")
+        before, after = t[t < 0][::-1], t[t >= 0]
+        if not before.size and after.size > 1 and after[0] == 0:
+            return self.system.integrate(self.q, self.v, after, rtol, **options)
+        parts = []
+        if before.size:
+            path = self.system.integrate(self.q, self.v, [0.0, *before], rtol, **options)
+            parts.append(_frames(path, slice(None, 0, -1)))
+        if after.size:
+            first = () if after[0] == 0 else (0.0,)
+            # the start alone is the first frame of any motion
+            path = self.system.integrate(self.q, self.v, [*first, *after] if after[-1] > 0 else [0.0, _moment(t)], rtol, **options)
+            parts.append(_frames(path, slice(len(first), len(first) + after.size)))
+        return _joined(parts)
+
+
+def _moment(t: NDArray) -> float:
+    """A short time, for a motion of which only the start is asked for."""
+    return 1e-6 * float(np.abs(t).max()) or 1e-6
+
+
+def _frames(path: Trajectory, part: slice) -> Trajectory:
+    return replace(path, **{name: getattr(path, name)[part] for name in FRAMES})
+
+
+def _joined(parts: list[Trajectory]) -> Trajectory:
+    last = parts[-1]
+    stats = last.stats | {n: sum(p.stats[n] for p in parts) for n in ("steps", "evaluations")}
+    stats["rank_drops"] = sorted(moment for p in parts for moment in p.stats["rank_drops"])
+    return replace(last, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in FRAMES}, stats=stats)
+
+
+def nonzero(name: str, value: float, why: str) -> float:
+    """A parameter that must be finite and not 0; `why` says what the system would be with 0."""
+    if checks.number(name, value) == 0:
+        raise ValueError(f"{name} must not be 0 ({why}); got {checks.shown(value)}")
+    return float(value)
+
+
+def positive(**values: float) -> None:
+    """Refuse parameters that are not positive, by name."""
+    for name, value in values.items():
+        checks.number(name, value, positive=True)
+
+
+def finite(**values: float) -> None:
+    """Refuse parameters that are not finite numbers, by name."""
+    for name, value in values.items():
+        checks.number(name, value)
