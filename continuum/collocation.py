@@ -21,7 +21,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from continuum.galerkin import Modes, SpectralRod
-from discs.integrators.gauss import tableau
+from discs.integrators.collocation import tableau
 from discs.skew import Phase, add
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from continuum import collocation
 from continuum.galerkin import Modes, SpectralRod
 from discs import SimulationError
-from discs.integrators.gauss import tableau
+from discs.integrators.collocation import tableau
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Phase
 

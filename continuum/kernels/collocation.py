@@ -120,7 +120,7 @@ def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v, momentum):
     """A step from hi + lo (3, n) and pi (n,), in place if it converges; the plain twin is `continuum.collocation.step`.
 
     modes : `continuum.galerkin.Modes`, of a configuration not far away.
-    tableau : of `discs.integrators.gauss`, with an even number of stages s.
+    tableau : of `discs.integrators.collocation`, with an even number of stages s.
     v, momentum : (s, 3, n) and (s, n), the rates and momenta of the stages, on return.
 
     Returns the number of sweeps, 0 if they did not converge.

@@ -1,5 +1,6 @@
-"""The compiled step of Gauss collocation; its plain twin is `discs.integrators.gauss`."""
+"""Gauss collocation: its coefficients, and the compiled step; the plain twin is `discs.integrators.gauss`."""
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +13,16 @@ from discs.kernels.shared import copy, forward, largest, renew
 from discs.skew import Phase
 
 
-class Collocation(NamedTuple):
-    """`Tableau`, and the limits of the sweeps."""
+class Tableau(NamedTuple):
+    """Coefficients of an s-stage Gauss method.
+
+    a : (s, s). b, nodes : (s,), weights, and places in [0, 1].
+    last : (s,), b^T a^{-1}, which takes the stages' momenta to those at the end of the step.
+
+    a is diagonalised: `real` holds its real eigenvalues (none or one) and `pairs` the complex ones with a positive imaginary
+    part; in : (number, s), rows that take stages to the eigenvector's part, and out : (number, s), what it is in the stages,
+    twice that for pairs, whose conjugates are left out.
+    """
 
     a: NDArray
     b: NDArray
@@ -25,6 +34,28 @@ class Collocation(NamedTuple):
     pairs: NDArray
     pairs_in: NDArray
     pairs_out: NDArray
+
+
+@cache
+def tableau(stages: int) -> Tableau:
+    """Collocation at the zeros c of the Legendre polynomial on [0, 1]: sum_j a_ij c_j^m = c_i^(m+1)/(m+1) for m < s."""
+    nodes, weights = np.polynomial.legendre.leggauss(stages)
+    c, b = (nodes + 1) / 2, weights / 2
+    powers = np.arange(stages)
+    a = (c[:, None] ** (powers + 1) / (powers + 1)) @ np.linalg.inv(c[:, None] ** powers)
+    values, out = np.linalg.eig(a)
+    into = np.linalg.inv(out)
+    real, upper = np.abs(values.imag) < 1e-12, values.imag > 1e-12
+    last = np.linalg.solve(a.T, b)
+    of_real = values[real].real, into[real].real, out.T[real].real
+    of_pairs = values[upper].astype(complex), into[upper].astype(complex), 2 * out.T[upper].astype(complex)
+    return Tableau(a, b, c, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
+
+
+class Collocation(NamedTuple):
+    """The method, and the limits of its sweeps."""
+
+    tableau: Tableau
     sweeps: int
     tolerance: float
 
@@ -99,13 +130,15 @@ def reach(c: NDArray, p: NDArray, tau: float, scale: NDArray, change: NDArray) -
 
 @fill(do.room, Collocation, _nrt=True)
 def _room(method: Collocation, chain: Any, state: Phase) -> Room:
-    (rows, n), columns, s = state.hi.shape, state.pi.shape[0], method.b.size
+    (rows, n), columns, s = state.hi.shape, state.pi.shape[0], method.tableau.b.size
     c, still, move = np.empty((rows, n)), np.zeros((rows, n)), np.empty((rows, n))
     stages, v = np.empty((s, rows, n)), np.empty((s, rows, n))
     p, force, rest = np.empty((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n))
     x, z, change = np.empty((columns, n)), np.empty((columns, n), np.complex128), np.empty(n)
-    stiff, single = do.factors(chain, 1.0, 1), do.factors(chain, 1.0, method.real.size)
-    return Room(c, still, move, stages, v, p, force, rest, x, z, change, stiff, single, do.factors(chain, 1.0j, method.pairs.size))
+    stiff, single = do.factors(chain, 1.0, 1), do.factors(chain, 1.0, method.tableau.real.size)
+    return Room(
+        c, still, move, stages, v, p, force, rest, x, z, change, stiff, single, do.factors(chain, 1.0j, method.tableau.pairs.size)
+    )
 
 
 @fill(do.step, Collocation)
@@ -121,15 +154,16 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
         room.stages,
         room.v,
     )
-    a, pi, s, stiff = method.a, before.pi, method.b.size, do.pick(chain, room.stiff, 0)
+    rule = method.tableau
+    a, pi, s, stiff = rule.a, before.pi, rule.b.size, do.pick(chain, room.stiff, 0)
     do.frame(chain, work, room.still, c)
     renew(c, pi, 0.5 * h, move, chain.scale, room.change)
     do.frame(chain, work, move, c)
     do.stiffness(chain, work, move, c, stiff)
-    for j in range(method.real.size):
-        do.precondition(chain, stiff, c, h * method.real[j], h * h * method.real[j] ** 2, do.pick(chain, room.single, j))
-    for j in range(method.pairs.size):
-        do.precondition(chain, stiff, c, h * method.pairs[j], h * h * method.pairs[j] ** 2, do.pick(chain, room.double, j))
+    for j in range(rule.real.size):
+        do.precondition(chain, stiff, c, h * rule.real[j], h * h * rule.real[j] ** 2, do.pick(chain, room.single, j))
+    for j in range(rule.pairs.size):
+        do.precondition(chain, stiff, c, h * rule.pairs[j], h * h * rule.pairs[j] ** 2, do.pick(chain, room.double, j))
     for i in range(s):
         copy(pi, p[i])
         forward(c, p[i], v[i])
@@ -146,7 +180,7 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
             forward(stages[i], p[i], v[i])
         for i in range(s):
             combine(a[i], v, h, move)
-            do.pullback(chain, work, before, t + method.nodes[i] * h, move, stages[i], p[i], force[i])
+            do.pullback(chain, work, before, t + rule.nodes[i] * h, move, stages[i], p[i], force[i])
         for i in range(s):
             combine(a[i], force, -h, rest[i])
             for row in range(pi.shape[0]):
@@ -154,14 +188,14 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
                     rest[i, row, k] += pi[row, k] - p[i, row, k]
         # the change of p, eigenvector by eigenvector
         force[:] = 0.0
-        for j in range(method.real.size):
-            transform(method.real_in[j], rest, x)
+        for j in range(rule.real.size):
+            transform(rule.real_in[j], rest, x)
             do.correct(chain, do.pick(chain, room.single, j), x)
-            spread(method.real_out[j], x, force)
-        for j in range(method.pairs.size):
-            transform(method.pairs_in[j], rest, z)
+            spread(rule.real_out[j], x, force)
+        for j in range(rule.pairs.size):
+            transform(rule.pairs_in[j], rest, z)
             do.correct(chain, do.pick(chain, room.double, j), z)
-            spread(method.pairs_out[j], z, force)
+            spread(rule.pairs_out[j], z, force)
         moved = 0.0
         for i in range(s):
             moved = max(moved, reach(c, force[i], 0.5 * h, chain.scale, room.change))
@@ -169,15 +203,15 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
                 for k in range(pi.shape[1]):
                     p[i, row, k] += force[i, row, k]
             forward(stages[i], p[i], v[i])
-    combine(method.b, v, h, move)
+    combine(rule.b, v, h, move)
     advance(before, move, 1.0, after)
     for row in range(pi.shape[0]):
         for k in range(pi.shape[1]):
             start, total = pi[row, k], 0.0
             for i in range(s):
-                total += method.last[i] * (p[i, row, k] - start)
+                total += rule.last[i] * (p[i, row, k] - start)
             after.pi[row, k] = start + total
-    return s * sweep, sweep * (method.real.size + method.pairs.size), method.tolerance > 0 and sweep == method.sweeps
+    return s * sweep, sweep * (rule.real.size + rule.pairs.size), method.tolerance > 0 and sweep == method.sweeps
 
 
 @fill(do.jumps, Collocation)

@@ -2,55 +2,16 @@
 
 from abc import ABC
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import ClassVar, NamedTuple
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.integrators.collocation import Collocation
+from discs.integrators.collocation import Collocation, tableau
 from discs.skew import Phase, SkewGradient, add
-
-
-class Tableau(NamedTuple):
-    """Coefficients of an s-stage Gauss method.
-
-    a : (s, s). b, nodes : (s,), weights, and places in [0, 1].
-    last : (s,), b^T a^{-1}, which takes the stages' momenta to those at the end of the step.
-
-    a is diagonalised: `real` holds its real eigenvalues (none or one) and `pairs` the complex ones with a positive imaginary
-    part; in : (number, s), rows that take stages to the eigenvector's part, and out : (number, s), what it is in the stages,
-    twice that for pairs, whose conjugates are left out.
-    """
-
-    a: NDArray
-    b: NDArray
-    nodes: NDArray
-    last: NDArray
-    real: NDArray
-    real_in: NDArray
-    real_out: NDArray
-    pairs: NDArray
-    pairs_in: NDArray
-    pairs_out: NDArray
-
-
-@cache
-def tableau(stages: int) -> Tableau:
-    """Collocation at the zeros c of the Legendre polynomial on [0, 1]: sum_j a_ij c_j^m = c_i^(m+1)/(m+1) for m < s."""
-    nodes, weights = np.polynomial.legendre.leggauss(stages)
-    c, b = (nodes + 1) / 2, weights / 2
-    powers = np.arange(stages)
-    a = (c[:, None] ** (powers + 1) / (powers + 1)) @ np.linalg.inv(c[:, None] ** powers)
-    values, out = np.linalg.eig(a)
-    into = np.linalg.inv(out)
-    real, upper = np.abs(values.imag) < 1e-12, values.imag > 1e-12
-    last = np.linalg.solve(a.T, b)
-    of_real = values[real].real, into[real].real, out.T[real].real
-    of_pairs = values[upper].astype(complex), into[upper].astype(complex), 2 * out.T[upper].astype(complex)
-    return Tableau(a, b, c, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
 
 
 @dataclass(frozen=True)
@@ -113,7 +74,7 @@ class Gauss(OneStep, ABC):
 
     @cached_property
     def parameters(self) -> "Collocation":
-        return Collocation(*tableau(self.stages), self.sweeps, float(self.tolerance))
+        return Collocation(tableau(self.stages), self.sweeps, float(self.tolerance))
 
 
 def _mix(weights: NDArray, stages: NDArray) -> NDArray:

@@ -15,7 +15,7 @@ from continuum.scenes import PAPER
 from continuum.spectral import bent_hint
 from discs import Gauss6, SimulationError
 from discs.integrators.base import Work
-from discs.integrators.gauss import tableau
+from discs.integrators.collocation import tableau
 from discs.skew import Phase
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}

@@ -8,8 +8,9 @@ import pytest
 
 from discs import Chain, Gauss8, Leapfrog, McLachlanPerlmutter, Midpoint, Problem, State, simulate
 from discs.integrators import METHODS, Integrator, Work, find
+from discs.integrators.collocation import tableau
 from discs.integrators.composition import Composition
-from discs.integrators.gauss import Gauss, tableau
+from discs.integrators.gauss import Gauss
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, models_and_engines, uneven
 from tests.discs.test_system import contact_from_the_definition
 
