@@ -9,7 +9,8 @@ from continuum.free_run import compare, nodes, run
 from continuum.free_start import Data, Given, check
 from continuum.rod import Rod
 from discs import Solution, checks
-from discs.simulation import MOST_STEPS, frame_times
+from discs.running.frames import frame_times
+from discs.simulation import MOST_STEPS
 
 MOST_NODES = 1_000_000
 

@@ -17,7 +17,7 @@ from continuum.rod import Scene
 from continuum.spectral import solve_spectral
 from continuum.told import tells_scene
 from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
-from discs.simulation import frame_times
+from discs.running.frames import frame_times
 from discs.warn import warn
 
 COARSEST = 33

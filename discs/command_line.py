@@ -15,9 +15,10 @@ from discs.files.safe import check_writable, fresh
 from discs.files.untrusted import printable
 from discs.integrators import METHODS
 from discs.problem import Problem
+from discs.running.frames import WANTS
 from discs.running.step_error import doubts
 from discs.running.time_loop import SimulationError
-from discs.simulation import ENGINES, WANTS, simulate
+from discs.simulation import ENGINES, simulate
 from discs.solution import Solution
 
 OFFERS = sorted({name for method in METHODS.values() for name in method.offers})

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
 from discs.integrators import Integrator, find, from_settings
-from discs.integrators.base import Cut, Frame
+from discs.integrators.base import Cut
 from discs.problem import Problem
+from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.recording import Recording, Rows, kept_settings
 from discs.running.step_error import WARNED, Watch, cure, doubts
 from discs.running.suggest import suggest_dt
@@ -21,10 +22,8 @@ from discs.running.tolerance import USUAL, NotReached, some_of, to_tolerance
 from discs.solution import Solution
 from discs.warn import warn
 
-WANTS = ("velocity", "slope", "contact_force")
 MOST_STEPS = 2.0**53
 ENGINES = ("compiled", "plain")
-ROUNDING = 1e-12  # of the duration: a frame or a step so much beyond it is at its end
 LOST = 0.01  # of the energy: a run is warned of
 
 
@@ -116,7 +115,7 @@ def _search(
     def run(problem: Problem, integrator: Integrator, dt: float, times: NDArray) -> Solution:
         return _run(problem, integrator, dt, times, want, progress, engine, None, False)
 
-    want = _wanted(want, () if method == "auto" else find(method).offers)
+    want = wanted(want, () if method == "auto" else find(method).offers)
     times, doubt = frame_times(frames, problem.duration), ""
     kept = None if checkpoint is None else kept_settings(checkpoint, tol)
     if kept is not None:
@@ -165,7 +164,7 @@ def _run(
 
     checked : look at the error of the steps. more : what else `stats` tells. estimate : of the error, if it is known.
     """
-    want = () if want == () else _wanted(want, integrator.offers)
+    want = () if want == () else wanted(want, integrator.offers)
     compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None and integrator.compiles
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
@@ -202,7 +201,7 @@ def _run(
         if record.complete:
             return record.solution({})
         march = March(problem, integrator, h, compiled, not progress, watch)
-        first = record.begin(march, lambda: _observed(march, 0.0, want, bool(offered)))
+        first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
         if march.step:
             shown.update(march.step)
         for f in range(first, times.size):
@@ -210,7 +209,7 @@ def _run(
             for taken in march.to(before):
                 shown.update(taken)
                 record.pause(f, march)
-            frame = partial(_observed, march, rest, want, bool(offered))
+            frame = partial(observed, march, rest, want, bool(offered))
             record.write(f, _uncut(frame, record, f, march))  # not kept here: the next step needs the room
             record.pause(f + 1, march)
         told: dict[str, Any] = about | {"steps": march.step, **vars(march.work)}
@@ -229,32 +228,6 @@ def _uncut(call: Callable[[], Any], record: Rows, f: int, march: March) -> Any:
             return call()
         except Cut:
             record.pause(f, march)
-
-
-def _observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:
-    """What a frame a time tau after the last step records."""
-    frame = march.frame(tau)
-    found = march.observe(frame)
-    if want:
-        found |= _extras(march, frame, march.step * march.h + tau, want)
-    if offered:
-        found |= march.integrator.extras(march.system, march.memory, march.h)
-    return found
-
-
-def _extras(march: March, frame: Frame, t: float, want: tuple[str, ...]) -> dict[str, Any]:
-    """What a frame records only when asked to."""
-    system, rate = march.system, frame.rate
-    shape = system.shape(frame.hi, frame.lo)
-    found: dict[str, Any] = {}
-    if "velocity" in want:
-        found |= {"x_rate": rate[0], "y_rate": rate[1]}
-    if "slope" in want:
-        found |= dict(zip(("slope_x", "slope_y"), system.slope(shape), strict=True))
-    if "contact_force" in want:
-        f = 0.0 if system.load is None else system.load.force(t, frame.hi + frame.lo, rate)
-        found["contact_force"] = system.contact_force(shape, rate, f)
-    return found
 
 
 class Progress:
@@ -279,38 +252,3 @@ class Progress:
             from tqdm import tqdm
 
             self._bar = tqdm(total=self._total, initial=self._done, desc=self._name, unit="step")
-
-
-def _wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
-    if want == ():
-        return ()
-    if not isinstance(want, Iterable):
-        raise ValueError(f"want must be names of quantities; got {checks.shown(want)}")
-    given = (want,) if isinstance(want, str) else tuple(want)
-    return tuple(checks.choice("want", name, (*WANTS, *offers)) for name in given)
-
-
-def steps_before(time: float, h: float) -> tuple[int, float]:
-    """Whole steps before a time, and the rest of the way; a time within rounding of a step is taken at the step."""
-    steps = int(time / h * (1 + 4e-16) + 1e-9)
-    rest = time - steps * h
-    return steps, rest if rest > 1e-9 * h else 0.0
-
-
-def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
-    """The times of frames, (F,), from their number or themselves; see `simulate`.
-
-    A time outside the duration by no more than rounding, as `np.arange(0, 0.35, 0.1)` makes of 0.3, is taken at its end.
-    """
-    if not isinstance(frames, (list, tuple)) and np.ndim(frames) == 0:
-        count = checks.whole("frames", frames, 1, "the last state is always one")
-        return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])
-    need = f"increasing times within [0, {duration:g}], or their number"
-    times = checks.array("frames", frames, need)
-    near = np.clip(times, 0.0, duration)
-    times = np.where(np.abs(times - near) <= ROUNDING * duration, near, times)
-    if times.ndim != 1 or not times.size or not np.isfinite(times).all():
-        raise ValueError(f"frames must be {need}; got {checks.shown(frames)}")
-    if times[0] < 0 or times[-1] > duration or (np.diff(times) <= 0).any():
-        raise ValueError(f"frames must be {need}; got {times.min():.17g} to {times.max():.17g}: {checks.shown(frames)}")
-    return times

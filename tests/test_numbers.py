@@ -15,7 +15,7 @@ from discs import Chain, Gauss6, Midpoint, Problem, State, SteeredChain, checks,
 from discs.chains.twist import untwisting_chain
 from discs.mechanics.oscillators import contact_oscillator, driven_oscillator
 from discs.mechanics.textbook import chaplygin_sleigh, knife_edge, rolling_disc
-from discs.simulation import frame_times
+from discs.running.frames import frame_times
 
 OWN = {"heading_inertia": 0.3, "stretch_stiffness": 4.0, "shear_stiffness": 3.0}
 LINE = np.arange(5.0)

@@ -16,7 +16,7 @@ from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain
 from discs.chains.twist import untwisting_chain
 from discs.command_line import summary
 from discs.integrators import METHODS
-from discs.simulation import steps_before
+from discs.running.frames import steps_before
 from tests.conftest import Model, models, uneven
 
 PARAMETERS = {

@@ -1,0 +1,76 @@
+"""The frames of a run: when they are, how many steps come before each, and what each records."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from discs import checks
+from discs.integrators.base import Frame
+from discs.running.time_loop import March
+
+WANTS = ("velocity", "slope", "contact_force")
+ROUNDING = 1e-12  # of the duration: a frame or a step so much beyond it is at its end
+
+
+def steps_before(time: float, h: float) -> tuple[int, float]:
+    """Whole steps before a time, and the rest of the way; a time within rounding of a step is taken at the step."""
+    steps = int(time / h * (1 + 4e-16) + 1e-9)
+    rest = time - steps * h
+    return steps, rest if rest > 1e-9 * h else 0.0
+
+
+def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
+    """The times of frames, (F,), from their number or themselves; see `simulate`.
+
+    A time outside the duration by no more than rounding, as `np.arange(0, 0.35, 0.1)` makes of 0.3, is taken at its end.
+    """
+    if not isinstance(frames, (list, tuple)) and np.ndim(frames) == 0:
+        count = checks.whole("frames", frames, 1, "the last state is always one")
+        return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])
+    need = f"increasing times within [0, {duration:g}], or their number"
+    times = checks.array("frames", frames, need)
+    near = np.clip(times, 0.0, duration)
+    times = np.where(np.abs(times - near) <= ROUNDING * duration, near, times)
+    if times.ndim != 1 or not times.size or not np.isfinite(times).all():
+        raise ValueError(f"frames must be {need}; got {checks.shown(frames)}")
+    if times[0] < 0 or times[-1] > duration or (np.diff(times) <= 0).any():
+        raise ValueError(f"frames must be {need}; got {times.min():.17g} to {times.max():.17g}: {checks.shown(frames)}")
+    return times
+
+
+def wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
+    """The quantities that frames record only when asked to; ValueError for one that neither `WANTS` nor the method `offers`."""
+    if want == ():
+        return ()
+    if not isinstance(want, Iterable):
+        raise ValueError(f"want must be names of quantities; got {checks.shown(want)}")
+    given = (want,) if isinstance(want, str) else tuple(want)
+    return tuple(checks.choice("want", name, (*WANTS, *offers)) for name in given)
+
+
+def observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:
+    """What a frame a time tau after the last step records."""
+    frame = march.frame(tau)
+    found = march.observe(frame)
+    if want:
+        found |= _asked(march, frame, march.step * march.h + tau, want)
+    if offered:
+        found |= march.integrator.extras(march.system, march.memory, march.h)
+    return found
+
+
+def _asked(march: March, frame: Frame, t: float, want: tuple[str, ...]) -> dict[str, Any]:
+    """What a frame records only when asked to."""
+    system, rate = march.system, frame.rate
+    shape = system.shape(frame.hi, frame.lo)
+    found: dict[str, Any] = {}
+    if "velocity" in want:
+        found |= {"x_rate": rate[0], "y_rate": rate[1]}
+    if "slope" in want:
+        found |= dict(zip(("slope_x", "slope_y"), system.slope(shape), strict=True))
+    if "contact_force" in want:
+        f = 0.0 if system.load is None else system.load.force(t, frame.hi + frame.lo, rate)
+        found["contact_force"] = system.contact_force(shape, rate, f)
+    return found
