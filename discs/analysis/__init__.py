@@ -1,1 +1,1 @@
-"""Questions about a motion: modes and equilibria, Lyapunov exponents, gradients of a cost with respect to parameters."""
+"""What is asked of a motion besides its run: the place of modes, Lyapunov exponents and gradients, none of which is written yet."""
