@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from compare import precision, report
@@ -12,11 +13,11 @@ from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
 from compare.sweeps import read
 from compare.trust import Trust, gathered, trust
-from continuum import steered_rod, untwisting_rod
+from continuum import Scene, steered_rod, untwisting_rod
 from continuum.files import read_scene
 from discs import command_line
 
-LAWS = {
+LAWS: dict[str, Callable[[], Scene]] = {
     "field": untwisting_rod,
     "unit": lambda: untwisting_rod(rolling="unit"),
     "own": lambda: steered_rod(stretch_stiffness=10, shear_stiffness=10, heading_inertia=0.25),

@@ -117,7 +117,8 @@ class _Worker:
                 self._hear()
                 self._ready = True
             self._ours.send_bytes(call)
-            return cloudpickle.loads(self._hear())
+            done: tuple[bool, Any] = cloudpickle.loads(self._hear())
+            return done
         except (EOFError, OSError):
             self._process.join(LOOK)
             return None
@@ -160,15 +161,15 @@ def _work(calls: Connection) -> None:
 def _answer(call: bytes) -> bytes:
     try:
         function, args, kwargs = cloudpickle.loads(call)
-        return cloudpickle.dumps((True, function(*args, **kwargs)))
+        answer: bytes = cloudpickle.dumps((True, function(*args, **kwargs)))
     except BaseException as error:
         error.add_note(traceback.format_exc())
         try:
             answer = cloudpickle.dumps((False, error))
             cloudpickle.loads(answer)
         except Exception:
-            return cloudpickle.dumps((False, RuntimeError(f"{type(error).__name__}, which cannot be sent to another process")))
-        return answer
+            answer = cloudpickle.dumps((False, RuntimeError(f"{type(error).__name__}, which cannot be sent to another process")))
+    return answer
 
 
 @contextmanager

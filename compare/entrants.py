@@ -8,7 +8,7 @@ import numpy as np
 
 from compare.peers import multipliers, reduced
 from compare.peers.peer import Outcome, Peer
-from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, Suzuki4, simulate
+from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, Solution, Suzuki4, simulate
 
 
 def ours(problem: Problem) -> list[Peer]:
@@ -39,7 +39,7 @@ def ours(problem: Problem) -> list[Peer]:
     ]
 
 
-def _outcome(problem: Problem, run: Callable) -> Outcome:
+def _outcome(problem: Problem, run: Callable[[], Solution]) -> Outcome:
     begun = clock.perf_counter()
     found = run()
     spent = clock.perf_counter() - begun

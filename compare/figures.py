@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from mpl_toolkits.mplot3d.axes3d import Axes3D
-from numpy.typing import NDArray
 
 from continuum import Scene
 from discs import Solution
+from discs.arrays import Float
 from discs.pictures import figures as of_discs
 from discs.pictures import geometry
 from discs.pictures.figures import given_or_new
@@ -97,7 +97,7 @@ def motion(run: Solution, scene: Scene, arrows: int = 24, instants: int = 5) -> 
     return figure
 
 
-def laws(runs: dict[str, Solution], distance: NDArray, instants: int = 5) -> list[Axes]:
+def laws(runs: dict[str, Solution], distance: Float, instants: int = 5) -> list[Axes]:
     """Two motions of the same rod: the distance between them, (fields, F), and their centre lines from above."""
     (first, a), (second, b) = runs.items()
     figure = Figure(figsize=(10.0, 4.2), layout="constrained")
@@ -121,7 +121,7 @@ def laws(runs: dict[str, Solution], distance: NDArray, instants: int = 5) -> lis
     return [left, right]
 
 
-def _stage(ax: Axes3D, middle: NDArray, reach: float) -> None:
+def _stage(ax: Axes3D, middle: Float, reach: float) -> None:
     ax.set_xlim(middle[0] - reach, middle[0] + reach)
     ax.set_ylim(middle[1] - reach, middle[1] + reach)
     ax.set_zlim(-0.3 * reach, 0.3 * reach)

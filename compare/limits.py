@@ -4,12 +4,11 @@ import csv
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from compare import figures
@@ -18,6 +17,8 @@ from compare.outputs import fresh_files
 from compare.study import Study, convergence, format_table
 from continuum import solve, steered_rod, untwisting_rod
 from discs import Solution, simulate
+from discs.arrays import Float
+from discs.pictures.style import BLUE, GREY, ORANGE
 
 SIZES = (17, 33, 65, 129, 257, 513)
 FAMILY = (10.0, 40.0, 160.0)
@@ -36,18 +37,18 @@ class Distances:
     """
 
     against: str
-    stretch: NDArray
-    shear: NDArray
-    inertia: NDArray
-    distance: NDArray
+    stretch: Float
+    shear: Float
+    inertia: Float
+    distance: Float
 
     @property
-    def rate(self) -> NDArray:
+    def rate(self) -> Float:
         """Slope of log distance against log G between rows, (S - 1, 3)."""
         return np.diff(np.log(self.distance), axis=0) / np.diff(np.log(self.shear))[:, None]
 
 
-def _ends(field: Solution) -> NDArray:
+def _ends(field: Solution) -> Float:
     every = (field.s.size - 1) // 64
     return np.stack([getattr(field, name)[-1, ::every] for name in ("x", "y", "theta")])
 
@@ -76,7 +77,7 @@ def from_the_paper(tol: float = 1e-3) -> list[Distances]:
     return [distances(name, family, solve(untwisting_rod(law), tol, frames=1, progress=False), tol) for name, law in laws]
 
 
-def locking(stiffness: tuple[float, ...] = LOCKING, n: int = 33) -> NDArray:
+def locking(stiffness: tuple[float, ...] = LOCKING, n: int = 33) -> Float:
     """A = G -> infinity at J = 0.05: largest distance that any disc moves in [0, 4.5], for each stiffness, (S,).
 
     A rod that neither stretches nor shears and rolls without sliding moves like a rigid body (the paper's section 3.5); from this
@@ -127,20 +128,20 @@ def limits(
     return "\n".join(text)
 
 
-def _draw(study: Study, unit: Distances, paper: list[Distances], reach: NDArray) -> Any:
-    figure = figures.Figure(figsize=(10, 7.8), layout="constrained")
+def _draw(study: Study, unit: Distances, paper: list[Distances], reach: Float) -> Figure:
+    figure = Figure(figsize=(10, 7.8), layout="constrained")
     axes = figure.subplots(2, 2)
     figures.convergence([study], axes[0, 0])
     axes[0, 0].set_title("(a) N discs against the field, A = G = 10, J = 0.25")
     for j, (symbol, line) in enumerate(zip(("x", "y", "θ"), ("o-", "s--", "^:"), strict=True)):
-        axes[0, 1].loglog(unit.shear, unit.distance[:, j], line, color=figures.BLUE, label=symbol)
+        axes[0, 1].loglog(unit.shear, unit.distance[:, j], line, color=BLUE, label=symbol)
     _slope(axes[0, 1], unit.shear, 0.5 * unit.distance.min(axis=1)[0], -1.0, "slope −1")
     axes[0, 1].set(
         xlabel="G, with A = 0 and J = 1/G",
         ylabel="distance at t = 4.5 (length, rad)",
         title="(b) to the unit law with true curvature",
     )
-    axes[1, 0].loglog(LOCKING, reach, marker="o", color=figures.ORANGE, label="largest motion of any disc")
+    axes[1, 0].loglog(LOCKING, reach, marker="o", color=ORANGE, label="largest motion of any disc")
     _slope(axes[1, 0], np.array(LOCKING), 0.6 * reach[0], -0.2, "slope −1/5")
     axes[1, 0].set(xlabel="A = G, with J = 0.05", ylabel="distance (length)", title="(c) the rod locks")
     axes[1, 0].yaxis.set_minor_locator(NullLocator())
@@ -148,7 +149,7 @@ def _draw(study: Study, unit: Distances, paper: list[Distances], reach: NDArray)
     kinds = [
         f"A = {a:g}, G = {g:g},\nJ = {j:.2g}" for a, g, j in zip(paper[0].stretch, paper[0].shear, paper[0].inertia, strict=True)
     ]
-    for d, colour, shift in zip(paper, (figures.ORANGE, figures.BLUE), (-0.18, 0.18), strict=True):
+    for d, colour, shift in zip(paper, (ORANGE, BLUE), (-0.18, 0.18), strict=True):
         axes[1, 1].barh(
             np.arange(len(kinds)) + shift, np.hypot(d.distance[:, 0], d.distance[:, 1]), 0.34, color=colour, label=d.against
         )
@@ -160,5 +161,5 @@ def _draw(study: Study, unit: Distances, paper: list[Distances], reach: NDArray)
     return figure
 
 
-def _slope(ax: Axes, x: NDArray, level: float, slope: float, text: str) -> None:
-    ax.loglog(x, level * (x / x[0]) ** slope, color=figures.GREY, linewidth=1, label=text)
+def _slope(ax: Axes, x: Float, level: float, slope: float, text: str) -> None:
+    ax.loglog(x, level * (x / x[0]) ** slope, color=GREY, linewidth=1, label=text)

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from compare import figures
@@ -20,6 +19,7 @@ from compare.lump import lump
 from compare.peers.peer import Cutoff, Peer
 from continuum import Scene
 from discs import Gauss8, Problem, SimulationError, checks, simulate
+from discs.arrays import Float
 
 SIZES = (32, 128, 512, 2048)
 WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
@@ -68,7 +68,7 @@ class WorkPrecision:
         """The problems, by name and number of discs."""
         return list(dict.fromkeys((row.problem, row.n) for row in self.rows))
 
-    def curve(self, problem: str, n: int, method: str) -> tuple[NDArray, NDArray]:
+    def curve(self, problem: str, n: int, method: str) -> tuple[Float, Float]:
         """Errors and seconds of a method, from loose to tight, without what is slower and less accurate than another of its
         runs."""
         found = [(r.error, r.seconds) for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method) and r.error < 1]
@@ -143,7 +143,7 @@ class WorkPrecision:
         return axes
 
 
-def reference(problem: Problem) -> tuple[NDArray, float]:
+def reference(problem: Problem) -> tuple[Float, float]:
     """Positions at the end by "gauss8" with short steps, (rows, n), and what halving them changes."""
     found = []
     for steps in (1000, 2000) if problem.system.kernel is not None else (250, 500):  # the plain form takes 50 times as long
@@ -152,7 +152,7 @@ def reference(problem: Problem) -> tuple[NDArray, float]:
     return found[1], distance(found[0], found[1])
 
 
-def distance(q: NDArray, exact: NDArray) -> float:
+def distance(q: Float, exact: Float) -> float:
     """Largest difference, each row relative to its largest value, absolute of a row that is zero."""
     size = np.abs(exact).max(axis=1)
     return float((np.abs(q - exact).max(axis=1) / np.where(size > 0, size, 1.0)).max())
@@ -246,7 +246,7 @@ def _quiet() -> Iterator[None]:
         yield
 
 
-def _first_runs(peer: Peer, blank: Row, exact: NDArray, limit: float) -> list[_Entry]:
+def _first_runs(peer: Peer, blank: Row, exact: Float, limit: float) -> list[_Entry]:
     """A method's runs from loose to tight."""
     entries: list[_Entry] = []
     started, cut = clock.perf_counter(), 0

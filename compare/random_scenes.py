@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import NDArray
 
 from continuum import Rod, Scene, SteeredRod
 from discs import checks
+from discs.arrays import Float
 
 KINDS = ("twist", "bump", "bent", "rolling", "stretched", "ring", "periodic", "own", "own ring", "bent end")
 DEGREE = 255  # of the polynomials that lines are integrated with: rounding, of at most eight waves
 PARAMETERS = {"density": 1.0, "spin_inertia": 1.0, "torsion_stiffness": 0.8, "bending_stiffness": 0.7, "radius": 1.0}
 FACTOR = 2.0  # parameters are the paper's times or over at most this
 
-Function = Callable[[NDArray], NDArray]
+Function = Callable[[Float], Float]
 
 
 class Drawn(NamedTuple):
@@ -84,10 +84,10 @@ def random_scene(seed: int, index: int) -> Drawn:
 class Initial:
     """Fields at places s: x, y, theta, omega, and of own headings phi, along the line, and its rate, zero."""
 
-    def __init__(self, line: Callable[[NDArray], tuple[NDArray, NDArray, NDArray]], theta: Function, rate: Function, own: bool):
+    def __init__(self, line: Callable[[Float], tuple[Float, Float, Float]], theta: Function, rate: Function, own: bool):
         self.line, self.theta, self.rate, self.own = line, theta, rate, own
 
-    def __call__(self, s: NDArray) -> tuple[NDArray, ...]:
+    def __call__(self, s: Float) -> tuple[Float, ...]:
         x, y, phi = self.line(s)
         fields = x, y, self.theta(s), self.rate(s)
         return (*fields, phi, 0 * s) if self.own else fields
@@ -102,7 +102,7 @@ def _factor(rng: np.random.Generator) -> float:
     return _between(rng, 1 / FACTOR, FACTOR)
 
 
-def _zero(s: NDArray) -> NDArray:
+def _zero(s: Float) -> Float:
     return 0 * s
 
 
@@ -120,7 +120,7 @@ def _bump(height: float, place: float, width: float) -> Function:
     return lambda s: height * np.exp(-(((s - place) / width) ** 2))
 
 
-def _straight(s: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def _straight(s: Float) -> tuple[Float, Float, Float]:
     return s, 0 * s, 0 * s
 
 
@@ -128,7 +128,7 @@ def _line(rng: np.random.Generator, length: float, bend: float, stretch: float, 
     """A line with r' = (1 + stretch sin(pi s/l)^4) (cos phi, sin phi), phi turning by `bend` at most, smoothly."""
     waves, domain = _series(rng, length, False, 1.0), [0.0, length]
 
-    def curvature(s: NDArray) -> NDArray:
+    def curvature(s: Float) -> Float:
         return (waves(s) + 0.7) * (1.0 if ends else np.sin(np.pi * s / length) ** 4)
 
     phi = Chebyshev.interpolate(curvature, DEGREE, domain).integ(lbnd=0)
@@ -147,7 +147,7 @@ def _ring(rng: np.random.Generator, length: float, size: float):  # type: ignore
     a, b = rng.standard_normal((2, 3)) * size / np.arange(2, 5)
     m, q = np.arange(2, 5), 2 * np.pi / length
 
-    def line(s: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def line(s: Float) -> tuple[Float, Float, Float]:
         waves = np.multiply.outer(q * s, m)
         radius = (1 + np.cos(waves) @ a + np.sin(waves) @ b) / q
         rate = (-np.sin(waves) @ (m * a) + np.cos(waves) @ (m * b)) / q

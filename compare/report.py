@@ -26,7 +26,7 @@ from compare.hardcases.table import stability
 from compare.main_job import INSTANTS, LONG, energy_runs
 from compare.outputs import fresh_files
 from compare.peers import reduced
-from compare.peers.reduced import Peer
+from compare.peers.peer import Peer
 from compare.precision import work_precision
 from compare.study import Study, convergence
 from continuum import Scene, solve, untwisting_rod

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from compare import figures
@@ -14,6 +14,7 @@ from compare.lump import lump
 from continuum import Scene, solve
 from continuum.solver import spline
 from discs import Integrator, Midpoint, Problem, Solution, Suzuki4, checks, simulate
+from discs.arrays import Float, Int
 
 TIGHT = Suzuki4(Midpoint(tolerance=1e-10))
 
@@ -35,9 +36,9 @@ class Study:
 
     scene: Scene
     ends: str
-    n: NDArray
-    k: NDArray
-    error: NDArray
+    n: Int
+    k: Float
+    error: Float
     floor: float
     dt: float
 
@@ -52,7 +53,7 @@ class Study:
         return ("ends", "N", "k", *(f"error {f}" for f in self.fields), *(f"order {f}" for f in self.fields))
 
     @property
-    def order(self) -> NDArray:
+    def order(self) -> Float:
         """Measured order between neighbouring rows, (S - 1, fields): log of the ratio of errors over log of that of spacings."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
@@ -123,7 +124,7 @@ def compared(scene: Scene) -> tuple[str, ...]:
     return ("x", "y", "theta", "phi") if scene.steered else ("x", "y", "theta")
 
 
-def checked_sizes(scene: Scene, n: ArrayLike, ends: str) -> tuple[NDArray, list[Problem]]:
+def checked_sizes(scene: Scene, n: ArrayLike, ends: str) -> tuple[Int, list[Problem]]:
     """The sizes of a study and their problems; ValueError if they are not increasing or too small."""
     sizes = np.atleast_1d(np.asarray(n))
     if sizes.ndim != 1 or not sizes.size or sizes.dtype.kind not in "iu" or (np.diff(sizes) <= 0).any():
@@ -131,10 +132,11 @@ def checked_sizes(scene: Scene, n: ArrayLike, ends: str) -> tuple[NDArray, list[
     return sizes, [lump(scene, int(size), ends) for size in sizes]
 
 
-def _periodic(scene: Scene, name: str, run: Solution) -> NDArray:
+def _periodic(scene: Scene, name: str, run: Solution) -> Float:
     """A field (F, N) less the part that grows around a rod periodic up to a shift."""
     shift = {"x": scene.shift[0], "y": scene.shift[1], "phi": 2 * np.pi * scene.turns}.get(name, 0.0)
-    return getattr(run, name) - shift * run.s / scene.rod.length
+    values: Float = getattr(run, name)
+    return values - shift * run.s / scene.rod.length
 
 
 def format_table(rows: list[tuple[str, ...]]) -> str:

@@ -119,11 +119,12 @@ class _Sent:
     @cached_property
     def content(self) -> bytes:
         try:
-            return cloudpickle.dumps(self.function)
+            content: bytes = cloudpickle.dumps(self.function)
         except Exception as error:
             raise ValueError(
                 f"the function of a sweep cannot be sent to other processes: {type(error).__name__}: {error}"
             ) from None
+        return content
 
     def __call__(self, case: Any) -> Any:
         return self.function(case)
@@ -134,7 +135,8 @@ class _Sent:
 
 @lru_cache(1)
 def _received(content: bytes) -> Callable[[Any], Any]:
-    return pickle.loads(content)
+    function: Callable[[Any], Any] = pickle.loads(content)
+    return function
 
 
 def cores() -> int:

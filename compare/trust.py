@@ -27,7 +27,6 @@ from textwrap import shorten
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from compare.lump import lump
@@ -35,6 +34,7 @@ from compare.random_scenes import Drawn, random_scene
 from compare.sweeps import Result, sweep
 from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
 from discs import Gauss8, SimulationError, Solution, checks, simulate
+from discs.arrays import Float
 
 FRAMES = 6
 SIZES = (128, 256, 512)  # links of the chains of a reference
@@ -228,18 +228,19 @@ def _apart(scene: Scene, a: Solution, b: Solution, names: Iterable[str]) -> floa
     return max(float(np.abs(getattr(a, name) - _at(scene, b, name, a.s)).max()) for name in names)
 
 
-def _at(scene: Scene, field: Solution, name: str, s: NDArray) -> NDArray:
+def _at(scene: Scene, field: Solution, name: str, s: Float) -> Float:
     """A field at places s, by its own nodes or a spline of degree 5 through them."""
     near = np.clip(np.searchsorted(field.s, s), 0, field.s.size - 1)
     near -= (near > 0) & (np.abs(field.s[near - 1] - s) < np.abs(field.s[near] - s))
-    values = getattr(field, name)
+    values: Float = getattr(field, name)
     if np.allclose(field.s[near], s, rtol=0, atol=1e-9 * scene.rod.length):
         return values[:, near]
+    places = field.s
     if scene.closed:
         more = {"x": scene.shift[0], "y": scene.shift[1], "phi": 2 * np.pi * scene.turns}.get(name, 0.0)
-        values = np.concatenate([values, values[:, :1] + more], axis=1)
-        return make_interp_spline(np.append(field.s, scene.rod.length), values, 5, axis=1)(s)
-    return make_interp_spline(field.s, values, 5, axis=1)(s)
+        places, values = np.append(places, scene.rod.length), np.concatenate([values, values[:, :1] + more], axis=1)
+    found: Float = make_interp_spline(places, values, 5, axis=1)(s)
+    return found
 
 
 def _chains_end(drawn: Drawn, seconds: float) -> str:

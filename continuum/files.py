@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from continuum.rod import Scene
-from continuum.scenes import LAW, PAPER, SCENES, steered_rod
+from continuum.scenes import LAW, SCENES, steered_rod
 from discs import checks
+from discs.chains.twist import PAPER
 from discs.files.safe import opened
 
 LARGEST = 2**14  # bytes of a scene file; a key of many parts, as a.a.a, takes memory as the square of its length

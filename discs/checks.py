@@ -11,7 +11,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from discs.arrays import Float
 
 MOST = 2**53  # the largest count; above it not every whole number is a double
 TEXTS = (str, bytes, bytearray, memoryview)
@@ -30,7 +32,7 @@ class _Short(reprlib.Repr):
         size = abs(x).bit_length()
         return repr(x) if size < 100 else f"a {'negative ' * (x < 0)}whole number of {int(size * 0.30103) + 1} digits"
 
-    def repr_ndarray(self, x: NDArray, level: int) -> str:
+    def repr_ndarray(self, x: Float, level: int) -> str:
         return super().repr_instance(x, level) if x.size < 4 else f"an array of shape {x.shape} and type {x.dtype}"
 
     repr_MaskedArray = repr_ndarray
@@ -72,7 +74,7 @@ def number(name: str, value: object, *, positive: bool = False) -> float:
     return float(given)
 
 
-def array(name: str, value: ArrayLike, need: str = "finite numbers") -> NDArray:
+def array(name: str, value: ArrayLike, need: str = "finite numbers") -> Float:
     """Return `value` as a new float array, entries may be infinite or NaN; else raise ValueError that names what is needed."""
     given = _doubles(value)
     if isinstance(given, str):
@@ -80,7 +82,7 @@ def array(name: str, value: ArrayLike, need: str = "finite numbers") -> NDArray:
     return given
 
 
-def field(name: str, value: ArrayLike, size: int, *, least: float | None = None, strict: bool = False) -> NDArray:
+def field(name: str, value: ArrayLike, size: int, *, least: float | None = None, strict: bool = False) -> Float:
     """Return `value` as a read-only float array (size,), a number standing for all of them and stored once.
 
     With `least`, every entry must be at least that, or larger if `strict`.
@@ -100,7 +102,7 @@ def field(name: str, value: ArrayLike, size: int, *, least: float | None = None,
     return given
 
 
-def vector(name: str, value: ArrayLike, size: int) -> NDArray:
+def vector(name: str, value: ArrayLike, size: int) -> Float:
     """Return `value` as a finite float array (size,), else raise ValueError."""
     given = array(name, value, f"{size} finite numbers")
     if given.shape != (size,) or not np.isfinite(given).all():
@@ -145,7 +147,7 @@ def _index(value: Any) -> int | None:
         return None
 
 
-def _doubles(value: ArrayLike) -> NDArray | str:
+def _doubles(value: ArrayLike) -> Float | str:
     """A new float array of what is given, or why it is none, as far as that can be said."""
     if isinstance(value, TEXTS):
         return ""

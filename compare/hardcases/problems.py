@@ -3,18 +3,19 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from time import thread_time as processor
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from compare.hardcases.runs import EXPLICIT, FRAMES, PEERS, Found, march, motion, peer, posed, processor
+from compare.hardcases.runs import EXPLICIT, FRAMES, PEERS, Found, march, motion, peer, posed
 from compare.lump import lump
 from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.dispersion import frequency, growth, symbols
 from continuum.exact import ring, standing_wave
 from continuum.scenes import SCENES
 from discs import Leapfrog, Problem, Solution, State
+from discs.arrays import Float
 from discs.running.time_loop import March
 from discs.simulation import lost_energy
 
@@ -45,7 +46,7 @@ def turned(problem: Problem, angle: float, move: tuple[float, float]) -> Problem
     return replace(problem, initial=State(c * x - d * y + move[0], d * x + c * y + move[1], s.theta, s.omega))
 
 
-def torsion_wave(problem: Problem) -> NDArray:
+def torsion_wave(problem: Problem) -> Float:
     """R = 0: nothing moves, and the paper's twist is a standing wave of the discs."""
     s, start = problem.chain.s, problem.initial
     wave = standing_wave(untwisting_rod(radius=0.0).rod, s, [problem.duration], 1, float(np.asarray(start.theta)[0]), n=s.size)
@@ -71,7 +72,7 @@ def rounding(make: Callable[[], Problem], dt: float, method: str, seconds: float
     or rad. (Of peers it is their tolerance that shows.)"""
     angle, move, problem = 0.7, (1 / 3, -0.2), posed(make)
 
-    def end(problem: Problem, seconds: float) -> tuple[Found, NDArray | None]:
+    def end(problem: Problem, seconds: float) -> tuple[Found, Float | None]:
         if method in PEERS:
             return peer(problem, method, seconds)
         found, run = march(problem, method, None if method in EXPLICIT else dt, seconds)
@@ -91,9 +92,9 @@ def rounding(make: Callable[[], Problem], dt: float, method: str, seconds: float
 class Growth(NamedTuple):
     """Growth rates of waves on a rolling rod: wave numbers q (modes,), measured and by the dispersion relation of the discs."""
 
-    q: NDArray
-    measured: NDArray
-    relation: NDArray
+    q: Float
+    measured: Float
+    relation: Float
 
 
 def rolling_waves(
@@ -114,7 +115,7 @@ def rolling_waves(
     scene = rolling_rod(rolling=rolling, duration=duration, bending_stiffness=stiffness, radius=0.7, density=1.3, spin_inertia=0.6)
     problem, rod = lump(scene, n), scene.rod
     k, modes = problem.chain.k, np.arange(1, (n + 1) // 2)
-    q = 2 * np.pi * modes / rod.length
+    q = np.asarray(2 * np.pi * modes / rod.length, dtype=float)
     push = rod.radius * symbols(q, k)[1] / growth(rod, q, 1.0, "field", k) if rolling == "field" else 0 * q
     vartheta = (1 - push**2) / rod.radius
     rate = growth(rod, q, 1.0, rolling, k)
@@ -136,7 +137,7 @@ def rolling_waves(
     measured = np.log(size[half:].max(axis=0) / size[: half + 1].max(axis=0)) / (duration / 2)
     error = float(np.abs(measured - rate).max())
     note = f"rates {measured.min():.3g} to {measured.max():.3g}, by the relation {rate.min():.3g} to {rate.max():.3g}"
-    return found._replace(error=error, note=note), Growth(q, measured, rate)
+    return found._replace(error=error, note=note), Growth(q, np.asarray(measured, dtype=float), rate)
 
 
 def waves(n: int, rolling: str, stiffness: float, duration: float, method: str, seconds: float, multiple: float = 0.5) -> Found:

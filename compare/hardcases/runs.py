@@ -9,11 +9,12 @@ from time import thread_time as processor  # what else a machine does at the tim
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compare.peers import reduced
+from compare.peers.peer import Cutoff
 from compare.precision import reference
 from discs import Problem, SimulationError, Solution, simulate, suggest_dt
+from discs.arrays import Float
 from discs.integrators import Integrator
 from discs.running.tolerance import to_tolerance
 from discs.simulation import LOST
@@ -102,7 +103,7 @@ def posed(make: Callable[[], Problem]) -> Problem:
 
 
 @lru_cache(2)
-def _known(make: Callable[[], Problem], exact: Callable[[Problem], NDArray] | None) -> NDArray | None:
+def _known(make: Callable[[], Problem], exact: Callable[[Problem], Float] | None) -> Float | None:
     """Positions at the end: exact ones, or by short steps of "gauss8" where these agree."""
     problem = posed(make)
     if exact is not None:
@@ -129,7 +130,7 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
     def spent() -> float:
         return processor() - begun
 
-    def timed(problem: Problem, integrator: str | Integrator, h: float, frames: int | NDArray) -> tuple[Solution, float]:
+    def timed(problem: Problem, integrator: str | Integrator, h: float, frames: int | Float) -> tuple[Solution, float]:
         start = processor()
         return simulate(problem, integrator, h, frames, progress=False), processor() - start
 
@@ -144,7 +145,7 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
             steps *= 4 if attempt else 1
         return taken * max(whole / steps, 1.0)
 
-    def run(problem: Problem, integrator: str | Integrator, h: float, times: NDArray) -> Solution:
+    def run(problem: Problem, integrator: str | Integrator, h: float, times: Float) -> Solution:
         if (expected := foretold(integrator, h)) > seconds - sum(cost):
             raise Slow(expected)
         heard.clear()  # the last run counts, not those that the search for a step began with
@@ -196,10 +197,10 @@ class Watched(reduced.Bound):
         self.t, share = t, spent / self.seconds
         if spent > max(0.1, self.seconds / 30) and (4 - 3 * share) * t < share * self.duration:
             self.gave_up = f"after {spent:.2g} s, as it would need over {self.seconds:g} s"
-            raise reduced.Cutoff
+            raise Cutoff
 
 
-def peer(problem: Problem, name: str, seconds: float) -> tuple[Found, NDArray | None]:
+def peer(problem: Problem, name: str, seconds: float) -> tuple[Found, Float | None]:
     """A run of a peer, at its tolerance RTOL; the right-hand side is the compiled one for all chains, energy is that at the end."""
     if name.startswith("CVODE") and not find_spec("sksundae"):
         return Found("-", says="scikit-sundae is not installed"), None
@@ -209,7 +210,7 @@ def peer(problem: Problem, name: str, seconds: float) -> tuple[Found, NDArray | 
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             end = next(p for p in found if p.name == name).run(RTOL, np.inf)
-    except (reduced.Cutoff, ArithmeticError, RuntimeError, ValueError) as error:
+    except (Cutoff, ArithmeticError, RuntimeError, ValueError) as error:
         outcome, says = ("cut off", f.gave_up) if f.gave_up else ("failed", str(error))
         return Found(outcome, f.t, seconds=processor() - f.begun, says=says), None
     spent = processor() - f.begun
@@ -224,7 +225,7 @@ def motion(
     method: str,
     seconds: float,
     step: Callable[[Problem], float] | None = None,
-    exact: Callable[[Problem], NDArray] | None = None,
+    exact: Callable[[Problem], Float] | None = None,
     compared: bool = True,
     note: Callable[[Problem, Solution], str] | None = None,
 ) -> Found:
@@ -244,7 +245,7 @@ def motion(
     return found if q is None or known is None else found._replace(error=_off(q, known))
 
 
-def _off(q: NDArray, known: NDArray) -> float:
+def _off(q: Float, known: Float) -> float:
     """Largest error, each row relative to its largest value; absolute where that is rounding."""
     size = np.abs(known).max(axis=1, keepdims=True)
     return float((np.abs(q - known) / np.where(size > 1e-12, size, 1.0)).max())

@@ -28,10 +28,10 @@ import exudyn as exu
 import numpy as np
 import scipy.sparse as sp
 from exudyn import itemInterface as items
-from numpy.typing import NDArray
 
 from compare.peers.peer import Cutoff, Outcome, Peer
 from discs import Chain, Problem
+from discs.arrays import Float
 from discs.chains import stencils
 
 STEPS = (45.0, 90.0, 180.0, 360.0, 720.0)
@@ -140,7 +140,7 @@ class _Rolling:
     slope, offset : r' of the block's discs from the positions of the discs `near`, (block, near), and for positions 0, (2, block).
     """
 
-    def __init__(self, mbs: Any, slope: NDArray, offset: NDArray, radius: NDArray, near: NDArray, unit: bool) -> None:
+    def __init__(self, mbs: Any, slope: Float, offset: Float, radius: Float, near: Float, unit: bool) -> None:
         self._state = mbs.systemData.GetODE2Coordinates  # of the iterate at hand, which is the current configuration
         self._slope, self._offset, self._radius, self._unit = slope.T.copy(), offset, radius, unit
         self._near = 3 * near + np.arange(2)[:, None]
@@ -151,13 +151,13 @@ class _Rolling:
         self._flat = self._rows.reshape(-1)  # shares the memory
         self._places = [np.ravel_multi_index((2 * disc + side, 3 * disc + 2), self._rows.shape) for side in range(2)]
 
-    def _contact(self) -> tuple[NDArray, NDArray]:
+    def _contact(self) -> tuple[Float, Float]:
         """e, by components."""
         slope = self._state()[self._near] @ self._slope + self._offset
         radius = self._radius / np.hypot(slope[0], slope[1]) if self._unit else self._radius
         return -radius * slope[1], radius * slope[0]
 
-    def value(self, mbs: Any, t: float, item: int, q: NDArray, v: NDArray, velocity_level: bool) -> NDArray:
+    def value(self, mbs: Any, t: float, item: int, q: Float, v: Float, velocity_level: bool) -> Float:
         """A(q) v of the block."""
         ex, ey = self._contact()
         rates = np.asarray(v).reshape(-1, 3)
@@ -166,7 +166,7 @@ class _Rolling:
         rows[:, 1] -= ey * rates[:, 2]
         return rows.ravel()
 
-    def matrix(self, mbs: Any, t: float, item: int, q: NDArray, v: NDArray, velocity_level: bool) -> NDArray:
+    def matrix(self, mbs: Any, t: float, item: int, q: Float, v: Float, velocity_level: bool) -> Float:
         """A(q) of the block, dense."""
         ex, ey = self._contact()
         self._flat[self._places[0]] = -ex

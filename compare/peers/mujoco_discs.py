@@ -36,10 +36,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compare.peers.peer import Cutoff, Outcome, Peer
 from discs import Chain, Problem
+from discs.arrays import Float
 from discs.running.suggest import suggest_dt
 
 X, Y, UP, HEADING, ROLL = range(5)
@@ -172,7 +172,7 @@ def _build(problem: Problem, h: float, second_order: bool) -> tuple[Any, Any]:
     return model, data
 
 
-def _pull(problem: Problem) -> Callable[[NDArray, NDArray], None]:
+def _pull(problem: Problem) -> Callable[[Float, Float], None]:
     """-grad V of MuJoCo's coordinates, into an array of its forces, and headings that follow the line; compiled for one chain."""
     from discs.kernels import protocol as do
     from discs.kernels.compiled import jit

@@ -4,11 +4,11 @@ import time as clock
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compare.peers.peer import TOLERANCES, Cutoff, Outcome, Peer
 from compare.peers.reduced import banded, read_only
 from discs import Problem
+from discs.arrays import Float
 
 
 def multiplier_peer(problem: Problem) -> Peer:
@@ -26,7 +26,7 @@ def multiplier_peer(problem: Problem) -> Peer:
     v0 = system.forward(system.frame(shape), z.pi)
     compiled = _residual(problem)
 
-    def residual(t: float, y: NDArray, yp: NDArray, out: NDArray) -> None:
+    def residual(t: float, y: Float, yp: Float, out: Float) -> None:
         calls[0] += 1
         if not calls[0] & 63 and clock.perf_counter() > until[0]:
             raise Cutoff
@@ -64,7 +64,7 @@ def multiplier_peer(problem: Problem) -> Peer:
     return Peer("IDA, multipliers", TOLERANCES[:7], run, "index 2; errors of the multipliers are not controlled")
 
 
-def _residual(problem: Problem) -> Callable[[NDArray, NDArray, NDArray], None]:
+def _residual(problem: Problem) -> Callable[[Float, Float, Float], None]:
     """The residual of the multiplier form, (y, y., out), compiled for one chain."""
     from discs.kernels import protocol as do
     from discs.kernels.compiled import jit
@@ -113,7 +113,7 @@ def saddle_peer(problem: Problem) -> Peer:
     calls, until = [0], [np.inf]
     disc = np.arange(n)
 
-    def f(t: float, y: NDArray) -> NDArray:
+    def f(t: float, y: Float) -> Float:
         calls[0] += 1
         if clock.perf_counter() > until[0]:
             raise Cutoff

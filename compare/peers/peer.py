@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from numpy.typing import NDArray
+from discs.arrays import Float
 
 
 class Cutoff(Exception):
@@ -14,12 +14,12 @@ class Outcome(NamedTuple):
     """Where a peer ended: positions (rows, n), its steps, right-hand sides, linear solves or factorisations (None: not told),
     seconds, momenta where it has them."""
 
-    q: NDArray
+    q: Float
     steps: int
     gradients: int
     solves: int | None
     seconds: float
-    pi: NDArray | None = None
+    pi: Float | None = None
 
 
 class Peer(NamedTuple):

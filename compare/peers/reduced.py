@@ -9,19 +9,19 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compare.peers.peer import TOLERANCES, Cutoff, Outcome, Peer
 from discs import Problem
+from discs.arrays import Float
 from discs.integrators.ivp import Reduced
 
 
-def bound(problem: Problem) -> Callable[[float, NDArray, NDArray], None]:
+def bound(problem: Problem) -> Callable[[float, Float, Float], None]:
     """f(t, y, out), compiled for one chain, whose parameters become constants of the code; in NumPy where there is no such form."""
     if problem.system.kernel is None:
         plain = Reduced(problem.system)
 
-        def in_numpy(t: float, y: NDArray, out: NDArray) -> None:
+        def in_numpy(t: float, y: Float, out: Float) -> None:
             out[:] = plain(t, y)
 
         return in_numpy
@@ -37,7 +37,7 @@ def bound(problem: Problem) -> Callable[[float, NDArray, NDArray], None]:
     return f
 
 
-def read_only(y: NDArray) -> NDArray:
+def read_only(y: Float) -> Float:
     """As SUNDIALS hands arrays to callbacks."""
     y = y.copy()
     y.flags.writeable = False
@@ -52,7 +52,7 @@ class Bound:
     f : (t, y, out), None to have one compiled for the chain, which takes seconds and saves a third of a call.
     """
 
-    def __init__(self, problem: Problem, f: Callable[[float, NDArray, NDArray], None] | None = None) -> None:
+    def __init__(self, problem: Problem, f: Callable[[float, Float, Float], None] | None = None) -> None:
         self.f, self.calls, self.until = f or bound(problem), 0, np.inf
         self.reduced = Reduced(problem.system)
         z = problem.start()
@@ -68,7 +68,7 @@ class Bound:
         """Start counting."""
         self.calls, self.until = 0, clock.perf_counter() + seconds
 
-    def fill(self, t: float, y: NDArray, out: NDArray) -> None:
+    def fill(self, t: float, y: Float, out: Float) -> None:
         """SUNDIALS' form. A failed callback is reported by the solver, not raised: NaN makes it stop."""
         self.calls += 1
         if not self.calls & 63:
@@ -80,7 +80,7 @@ class Bound:
         if clock.perf_counter() > self.until:
             raise Cutoff
 
-    def __call__(self, t: float, y: NDArray) -> NDArray:
+    def __call__(self, t: float, y: Float) -> Float:
         """SciPy's form."""
         out = np.empty_like(y)
         self.fill(t, np.ascontiguousarray(y), out)

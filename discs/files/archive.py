@@ -14,9 +14,9 @@ from platform import python_version
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.chains.chain import Chain, SteeredChain
 from discs.files import safe
 from discs.problem import Problem, State
@@ -87,13 +87,13 @@ class Header(NamedTuple):
     """
 
     attrs: dict[str, Any]
-    static: dict[str, NDArray]
+    static: dict[str, Float]
 
 
 # A problem as data
 
 
-def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, NDArray]]:
+def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, Float]]:
     """A problem as numbers and words, and arrays by the names of `PARAMETERS` of what differs from disc to disc."""
     chain, initial = problem.chain, problem.initial
     if problem.loads:
@@ -107,7 +107,7 @@ def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, NDArray]]:
     return told, {name: value for name, value in arrays.items() if name not in equal}
 
 
-def rebuild(told: dict[str, Any], arrays: dict[str, NDArray]) -> Problem:
+def rebuild(told: dict[str, Any], arrays: dict[str, Float]) -> Problem:
     """The problem of `describe`; whatever does not make one is refused by it with a ValueError."""
     given = told | arrays
     kind = CHAINS[checks.choice("chain", given.pop("chain", None), CHAINS)]
@@ -135,7 +135,7 @@ def versions() -> dict[str, str]:
 
 
 def header(
-    problem: Problem | None, times: NDArray, s: NDArray, stats: dict[str, Any], estimate: dict[str, float] | None, complete: bool
+    problem: Problem | None, times: Float, s: Float, stats: dict[str, Any], estimate: dict[str, float] | None, complete: bool
 ) -> Header:
     """The header of a file."""
     told, arrays = describe(problem) if problem is not None else (None, {})
@@ -156,7 +156,7 @@ def header(
     return Header(attrs | {"checksum": header_checksum(attrs, static)}, static)
 
 
-def header_checksum(attrs: dict[str, Any], static: dict[str, NDArray]) -> int:
+def header_checksum(attrs: dict[str, Any], static: dict[str, Float]) -> int:
     """Of the problem, the times and the places."""
     total = zlib.crc32(attrs["problem"].encode())
     for name in sorted(static):
@@ -164,7 +164,7 @@ def header_checksum(attrs: dict[str, Any], static: dict[str, NDArray]) -> int:
     return total
 
 
-def frame_checksum(rows: dict[str, NDArray]) -> int:
+def frame_checksum(rows: dict[str, Float]) -> int:
     """Of what one frame records, by name; never zero."""
     total = 0
     for name in sorted(rows):
@@ -182,7 +182,7 @@ def fixed(value: Any) -> Any:
     return np.bytes_(value.encode()) if isinstance(value, str) else value
 
 
-def recorded(run: Solution) -> dict[str, NDArray]:
+def recorded(run: Solution) -> dict[str, Float]:
     """What the frames of a run hold, by name."""
     return {name: np.asarray(value) for name in QUANTITIES if (value := getattr(run, name)) is not None}
 

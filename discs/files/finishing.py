@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.files import archive, safe, untrusted
 from discs.files.framefile import FrameFile
 
 
-def outside(file: FrameFile) -> dict[str, NDArray]:
+def outside(file: FrameFile) -> dict[str, Float]:
     """What of a file is no variable: "bytes" (m,), and "ends" (k, 2), where its pieces begin and end, the last with the file."""
     taken = sorted((offset, offset + 8 * int(np.prod(shape, dtype=int))) for offset, shape in file.places.values())
     begins, ends = [0, *(end for _, end in taken)], [*(begin for begin, _ in taken), file.size]
@@ -23,7 +23,7 @@ def outside(file: FrameFile) -> dict[str, NDArray]:
     return {"bytes": np.frombuffer(data, np.uint8), "ends": np.array([begins, ends]).T}
 
 
-def put_back(path: Path, kept: dict[str, NDArray]) -> None:
+def put_back(path: Path, kept: dict[str, Float]) -> None:
     """Make a file again what it was when `outside` gave `kept`; its variables have not changed since."""
     fd, data, place = safe.opened(path, os.O_RDWR), kept["bytes"].tobytes(), 0
     try:

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.files import archive, safe, untrusted
 from discs.files.archive import CHECKSUM, COORDINATES, PARAMETERS, QUANTITIES, Header, attributes, dimensions
 from discs.problem import Problem
@@ -161,10 +161,10 @@ class FrameFile:
             **rows,
         )
 
-    def _write(self, name: str, f: int, value: NDArray) -> None:
+    def _write(self, name: str, f: int, value: Float) -> None:
         safe.write_all(self._fd, value.reshape(-1).view(np.uint8).data, self.places[name][0] + f * value.nbytes)
 
-    def _read(self, name: str, f: int | None = None) -> NDArray:
+    def _read(self, name: str, f: int | None = None) -> Float:
         """A variable, or its frame f, read from the file."""
         offset, shape = self.places[name]
         if f is not None:
@@ -183,7 +183,7 @@ class FrameFile:
             offset, left = offset + len(part), left - len(part)
         return data
 
-    def _increasing(self, name: str) -> NDArray:
+    def _increasing(self, name: str) -> Float:
         """A variable whose numbers increase, read in parts, so that a file is refused early that is large and says nothing."""
         offset, (size,) = self.places[name]
         parts = [np.empty(0)]
@@ -194,7 +194,7 @@ class FrameFile:
                 raise ValueError(f"{name} does not increase")
         return np.concatenate(parts)
 
-    def _rows(self, name: str, count: int) -> NDArray:
+    def _rows(self, name: str, count: int) -> Float:
         offset, (_, *rest) = self.places[name]
         if self.size > archive.MAPPED:
             with open(os.dup(self._fd), "rb") as file:

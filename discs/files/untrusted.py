@@ -42,7 +42,8 @@ def told(name: str, text: str | int) -> dict[str, Any] | None:
     if name == "error_estimate":
         for key, error in (value or {}).items():
             _check(f"attribute 'error_estimate', {key!r}", error, NUMBER)
-    return value
+    checked: dict[str, Any] | None = value
+    return checked
 
 
 def _check(name: str, value: Any, kinds: tuple[type, ...]) -> None:

@@ -5,8 +5,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.skew import Load
 
 
@@ -41,8 +41,9 @@ class Linear(Load):
                 raise ValueError(f"{name} must be finite{'' if name == 'constant' else ' and at least 0'}; got {value}")
             object.__setattr__(self, name, np.array(value))
 
-    def force(self, t: float, q: NDArray, v: NDArray) -> NDArray:
-        return self.constant - self.damping * v - self.stiffness * q
+    def force(self, t: float, q: Float, v: Float) -> Float:
+        found: Float = self.constant - self.damping * v - self.stiffness * q
+        return found
 
     @cached_property
     def parameters(self) -> Any:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.loads.linear import Linear
 from discs.skew import Load
 
@@ -19,8 +19,9 @@ class Total(Load):
         for name in ("damping", "stiffness"):
             object.__setattr__(self, name, np.sum([getattr(load, name) for load in self.loads], axis=0))
 
-    def force(self, t: float, q: NDArray, v: NDArray) -> NDArray:
-        return np.sum([load.force(t, q, v) for load in self.loads], axis=0)
+    def force(self, t: float, q: Float, v: Float) -> Float:
+        found: Float = np.sum([load.force(t, q, v) for load in self.loads], axis=0)
+        return found
 
 
 def total(loads: tuple[Load, ...]) -> Load | None:

@@ -17,12 +17,13 @@ distance d whose headings differ by delta, mirrored by the line between them, to
 """
 
 from dataclasses import dataclass
-from typing import Any
+from types import ModuleType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float, Int
 from discs.solution import Solution
 
 
@@ -39,14 +40,14 @@ class Rolled:
     slip : (F,), speed - R omega.
     """
 
-    t: NDArray
-    x: NDArray
-    theta: NDArray
-    speed: NDArray
-    omega: NDArray
-    friction: NDArray
-    normal: NDArray
-    slip: NDArray
+    t: Float
+    x: Float
+    theta: Float
+    speed: Float
+    omega: Float
+    friction: Float
+    normal: Float
+    slip: Float
 
 
 def rolling_in_pymunk(
@@ -103,10 +104,10 @@ def rolling_in_pymunk(
         states[step + 1] = body.position.x, -body.angle, body.velocity.x, -body.angular_velocity
         body.each_arbiter(lambda arbiter, step=step: forces.__setitem__(step, np.array(arbiter.total_impulse) / h))
     x, theta, speed, omega = states.T
-    return Rolled(h * np.arange(steps + 1), x, theta, speed, omega, forces[:, 0], forces[:, 1], speed - radius * omega)
+    return Rolled(h * np.arange(steps + 1.0), x, theta, speed, omega, forces[:, 0], forces[:, 1], speed - radius * omega)
 
 
-def footprints_touch(run: Solution, radius: ArrayLike, thickness: float) -> NDArray:
+def footprints_touch(run: Solution, radius: ArrayLike, thickness: float) -> Int:
     """Which discs touch, seen from above as rectangles 2 R by `thickness`.
 
     Parameters
@@ -151,7 +152,7 @@ def footprints_touch(run: Solution, radius: ArrayLike, thickness: float) -> NDAr
     return np.array(sorted(touches), dtype=int).reshape(-1, 3)
 
 
-def _pymunk() -> Any:
+def _pymunk() -> ModuleType:
     try:
         import pymunk
     except ImportError:

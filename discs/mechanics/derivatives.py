@@ -19,12 +19,13 @@ import importlib
 import sys
 import warnings
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
+
+from discs.arrays import Float
 
 STEP = 1e-30  # of the complex step
 EPS = float(np.finfo(float).eps)
@@ -55,16 +56,16 @@ class Formula:
     error : estimated error of its last derivatives, relative to their largest entry; 0 for the complex step.
     """
 
-    def __init__(self, name: str, call: Callable[[NDArray], Any], shape: tuple[int, ...], size: int) -> None:
+    def __init__(self, name: str, call: Callable[[Float], Any], shape: tuple[int, ...], size: int) -> None:
         self.name, self.shape, self.size = name, shape, size
         self.how, self.error = "complex step", 0.0
         self._call = call
-        self._steps: NDArray | None = None  # (m,), of real differences
+        self._steps: Float | None = None  # (m,), of real differences
         self._verified = False  # whether the complex step agreed with real differences once
         self._slack = 0.0  # relative difference from real differences that rounding was found to explain
         self._mix = np.cos(1.0 + 3.7 * np.arange(size)) / 4 + 0.75 * (-1.0) ** np.arange(size)  # 1/2 ... 1 in size, both signs
 
-    def __call__(self, q: NDArray) -> NDArray:
+    def __call__(self, q: Float) -> Float:
         """The value at q, finite or not."""
         with np.errstate(all="ignore"), _double():
             given = self._call(np.array(q, dtype=float))
@@ -74,7 +75,7 @@ class Formula:
             raise ValueError(f"{self.name}(q) must be real numbers in double precision; got {value.dtype}")
         return self._array(value, float)
 
-    def along(self, q: NDArray, v: NDArray) -> NDArray:
+    def along(self, q: Float, v: Float) -> Float:
         """df/dq.v, of the formula's shape."""
         steps = self._ready(q)
         with np.errstate(all="ignore"):
@@ -83,13 +84,14 @@ class Formula:
             return np.zeros(self.shape)
         return self._derivatives(q, v[:, None], np.array([1 / reach]), v)[..., 0]
 
-    def slopes(self, q: NDArray) -> NDArray:
+    def slopes(self, q: Float) -> Float:
         """df/dq, (*shape, m)."""
         steps = self._ready(q)
         return self._derivatives(q, np.eye(self.size), self._mix * steps, None)
 
-    def _derivatives(self, q: NDArray, directions: NDArray, weights: NDArray, v: NDArray | None) -> NDArray:
+    def _derivatives(self, q: Float, directions: Float, weights: Float, v: Float | None) -> Float:
         """Derivatives along the columns of `directions` (m, k), the check being along directions @ weights."""
+        assert self._steps is not None
         if self.how == "complex step":
             found = self._complex(q, directions)
             if found is not None and self._verified and (1e3 * EPS * np.abs(q) > self._steps).any():
@@ -102,7 +104,6 @@ class Formula:
                 self._slack = min(2 * off, MOST_SLACK)  # the comparison was at fault: a formula with more rounding than most
                 return found
             return whole if v is None else (whole @ v)[..., None]
-        assert self._steps is not None
         # a single direction has its own step, the shortest that the coordinates ask for
         scales = weights if v is not None else self._steps
         taken = [self._difference(q, h * d, 1 / h) for h, d in zip(scales, directions.T, strict=True)]
@@ -116,7 +117,7 @@ class Formula:
 
     # The complex step
 
-    def _complex(self, q: NDArray, directions: NDArray) -> NDArray | None:
+    def _complex(self, q: Float, directions: Float) -> Float | None:
         """Derivatives along the columns by the complex step; None where the formula does not take complex numbers."""
         found = []
         try:
@@ -128,7 +129,7 @@ class Formula:
             return None
         return np.stack(found, axis=-1)
 
-    def _off(self, q: NDArray, found: NDArray, d: NDArray) -> float:
+    def _off(self, q: Float, found: Float, d: Float) -> float:
         """Relative difference of `found`, a derivative along d, and a real one of order 4, beyond that one's error."""
         pairs = self._pairs(q, d, 2)
         if pairs is None or not np.isfinite(found).all():
@@ -141,7 +142,7 @@ class Formula:
 
     # Real differences
 
-    def _ready(self, q: NDArray) -> NDArray:
+    def _ready(self, q: Float) -> Float:
         if self._steps is None:
             if not np.isfinite(self(q)).all():
                 raise ValueError(f"{self.name} is not finite at q = {q}")
@@ -150,7 +151,7 @@ class Formula:
         assert self._steps is not None
         return self._steps
 
-    def _refuse_single(self, q: NDArray) -> None:
+    def _refuse_single(self, q: Float) -> None:
         """ValueError if all entries that change with q are numbers of single precision at several places."""
         base, changed, single = self(q), np.zeros(self.shape, dtype=bool), np.ones(self.shape, dtype=bool)
         for j in range(1, 4):
@@ -166,7 +167,7 @@ class Formula:
                 f"{self.name}(q) is computed in single precision, with 7 digits, too few for its derivatives; use float64"
             )
 
-    def _examine(self, q: NDArray) -> NDArray:
+    def _examine(self, q: Float) -> Float:
         """df/dq by real differences with steps sought anew, and whether the complex step agrees with it."""
         found, errors, steps = zip(*(self._search(q, k) for k in range(self.size)), strict=True)
         self._steps, whole = np.array(steps), np.stack(found, axis=-1)
@@ -183,12 +184,12 @@ class Formula:
         self.error = error
         return whole
 
-    def _search(self, q: NDArray, k: int) -> tuple[NDArray, float, float]:
+    def _search(self, q: Float, k: int) -> tuple[Float, float, float]:
         """Derivative along coordinate k, its error, and the step; see the head of the module."""
         unit = np.eye(self.size)[k]
         step = max(1e-12 * abs(q[k]), 1e-12)
         longest = 1e-2 * max(abs(q[k]), 1.0)
-        best: tuple[NDArray, float, float] | None = None
+        best: tuple[Float, float, float] | None = None
         while step <= longest:
             new, error = self._difference(q, step * unit, 1 / step)
             error += 4 * EPS * abs(q[k]) / step * float(np.abs(new).max(initial=0.0))  # the step itself is rounded
@@ -206,7 +207,7 @@ class Formula:
             raise ValueError(f"{self.name} is not finite about q = {q}: it has no derivative there")
         return best
 
-    def _difference(self, q: NDArray, d: NDArray, scale: float) -> tuple[NDArray, float]:
+    def _difference(self, q: Float, d: Float, scale: float) -> tuple[Float, float]:
         """Derivative along d times `scale` by differences of order 8, and its error."""
         pairs = self._pairs(q, d, 4)
         if pairs is None:
@@ -215,7 +216,7 @@ class Formula:
         eighth, sixth = (np.tensordot(w, differences, 1) for w in (ORDER_8, ORDER_6))
         return eighth * scale, float(4 * np.abs(eighth - sixth).max(initial=0.0) + 2 * EPS * size) * scale
 
-    def _pairs(self, q: NDArray, d: NDArray, count: int) -> tuple[NDArray, float] | None:
+    def _pairs(self, q: Float, d: Float, count: int) -> tuple[Float, float] | None:
         """f(q + j d) - f(q - j d), j = 1 ... count, and the largest |f|; None if one of them is not finite."""
         found, size = [], 0.0
         for j in range(1, count + 1):
@@ -229,7 +230,7 @@ class Formula:
             found.append(after - before)
         return (np.array(found), size) if np.isfinite(size) else None
 
-    def _array(self, given: Any, dtype: type | None) -> NDArray:
+    def _array(self, given: Any, dtype: type | None) -> Float:
         """What a formula returned as an array of its own, of the right shape; one row may be given as a vector."""
         if scipy.sparse.issparse(given):
             given = given.toarray()
@@ -255,11 +256,13 @@ class ShapeError(ValueError):
         self.given = given
 
 
-def _double() -> Any:
+def _double() -> AbstractContextManager[object]:
     """JAX in double precision, where it is in use; formulas in `jax.numpy` are in single precision otherwise."""
     jax = sys.modules.get("jax")
     if jax is None:
         return nullcontext()
     if hasattr(jax, "enable_x64"):
-        return jax.enable_x64(True)
-    return importlib.import_module("jax.experimental").enable_x64()  # before jax 0.8
+        double: AbstractContextManager[object] = jax.enable_x64(True)
+    else:  # before jax 0.8
+        double = importlib.import_module("jax.experimental").enable_x64()
+    return double

@@ -8,8 +8,8 @@ A^T.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Bool, Float
 from discs.mechanics import saddle
 from discs.mechanics.equations import Equations
 from discs.mechanics.saddle import dense
@@ -33,7 +33,7 @@ class Drift:
         self.off = np.zeros(int(self.rows.sum()))
         self.drive = system.drive[self.rows]
 
-    def _closed(self) -> NDArray:
+    def _closed(self) -> Bool:
         """Rows with dA_a(u, w) = (dA_a.u) w - (dA_a.w) u = 0 for random u, w, at the start and near it."""
         rng, system = np.random.default_rng(1), self.system
         closed = np.ones(len(system.owners), dtype=bool)
@@ -47,12 +47,12 @@ class Drift:
                 closed &= np.abs(one - other) <= CLOSED * (np.abs(one) + np.abs(other))
         return closed
 
-    def add(self, before: NDArray, after: NDArray, time: float) -> None:
+    def add(self, before: Float, after: Float, time: float) -> None:
         """Add what a step over `time` from q `before` to q `after` adds to the drift."""
         if self.off.size:
             self.off = self.off + self._change(before, after) - self.drive * time
 
-    def positions(self, q: NDArray) -> NDArray:
+    def positions(self, q: Float) -> Float:
         """q with the drift taken back; q itself where there is none."""
         for _ in range(4):
             if not self.off.size:
@@ -65,7 +65,7 @@ class Drift:
             self.off, q = self.off + self._change(q, q + shift), q + shift
         return q
 
-    def corrected(self, y: NDArray) -> NDArray:
+    def corrected(self, y: Float) -> Float:
         """(q, v, mu) with q and v back on the constraints; y itself where they are, or where the rows of A are dependent."""
         try:
             q = self.positions(y[: self.m])
@@ -78,9 +78,10 @@ class Drift:
             return y
         return np.concatenate([q, v, y[2 * self.m :]])
 
-    def _change(self, before: NDArray, after: NDArray) -> NDArray:
+    def _change(self, before: Float, after: Float) -> Float:
         """c_a(after) - c_a(before) by Gauss's formula."""
         way = after - before
         places = (before + (0.5 + 0.5 * node) * way for node in NODES)
         rows = (dense(self.system.constraint(q))[self.rows] @ way for q in places)
-        return np.sum([0.5 * w * row for w, row in zip(WEIGHTS, rows, strict=True)], axis=0)
+        found: Float = np.sum([0.5 * w * row for w, row in zip(WEIGHTS, rows, strict=True)], axis=0)
+        return found

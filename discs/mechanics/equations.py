@@ -23,13 +23,14 @@ The skew-gradient form of `discs.chains.rolling_discs` takes the B with B^T M B 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float, Matrix
 from discs.mechanics import saddle
 from discs.mechanics.derivatives import Formula
 from discs.mechanics.saddle import dense
@@ -38,8 +39,8 @@ from discs.mechanics.saddle import dense
 class Response(NamedTuple):
     """Accelerations (m,) and multipliers lambda (c,), the forces of constraint being A^T lambda."""
 
-    acceleration: NDArray
-    multipliers: NDArray
+    acceleration: Float
+    multipliers: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +63,13 @@ class Equations:
 
     names: tuple[str, ...]
     owners: tuple[str, ...]
-    mass: Callable[[NDArray], Any]
-    potential: Callable[[NDArray], float]
-    force: Callable[[NDArray, NDArray], NDArray]
-    constraint: Callable[[NDArray], Any]
-    constraint_rate: Callable[[NDArray, NDArray], Any]
-    drive: NDArray
-    symmetry: Callable[[NDArray], NDArray] | None = None
+    mass: Callable[[Float], Matrix]
+    potential: Callable[[Float], float]
+    force: Callable[[Float, Float], Float]
+    constraint: Callable[[Float], Matrix]
+    constraint_rate: Callable[[Float, Float], Matrix]
+    drive: Float
+    symmetry: Callable[[Float], Float] | None = None
     formulas: tuple[Formula, ...] = ()
 
     def __post_init__(self) -> None:
@@ -76,15 +77,15 @@ class Equations:
         object.__setattr__(self, "owners", names_of("owners", self.owners))
         object.__setattr__(self, "drive", checks.field("drive", self.drive, len(self.owners)))
 
-    def saddle_point(self, q: NDArray) -> Any:
+    def saddle_point(self, q: Float) -> Matrix:
         """The matrix [[M, A^T], [A, 0]], (m + c, m + c), sparse if A is."""
         return saddle.matrix(self.mass(q), self.constraint(q))
 
-    def _solve(self, q: NDArray, f: NDArray, g: NDArray) -> Response:
+    def _solve(self, q: Float, f: Float, g: Float) -> Response:
         """u and lambda with M u = f + A^T lambda, A u = g."""
         return Response(*saddle.solve(self.mass(q), self.constraint(q), f, g, self.names, self.owners))
 
-    def magnetic(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+    def magnetic(self, q: ArrayLike, v: ArrayLike) -> Float:
         """G of the vakonomic equations, (m, c): (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) v_k; see
         `discs.mechanics.vakonomic`."""
         q, v = self._vectors(q, v)
@@ -110,7 +111,7 @@ class Equations:
             f = f + self.magnetic(q, v) @ checks.vector("mu", mu, len(self.owners))
         return self._solve(q, f, -(self.constraint_rate(q, v) @ v))
 
-    def consistent_velocity(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+    def consistent_velocity(self, q: ArrayLike, v: ArrayLike) -> Float:
         """The velocity u nearest to v that the constraints allow: A u = b and (u - v).M(u - v) least, (m,).
 
         So M (u - v) = A^T mu: it is what an impulse of the constraints' own forces makes of v.
@@ -134,22 +135,22 @@ class Equations:
         acceleration = w + b @ np.linalg.solve(b.T @ m @ b, b.T @ (f - m @ w))
         return Response(d * acceleration, r * np.linalg.solve(square, a @ (m @ acceleration - f)))
 
-    def residual(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+    def residual(self, q: ArrayLike, v: ArrayLike) -> Float:
         """A v - b, (c,)."""
         q, v = self._vectors(q, v)
-        return self.constraint(q) @ v - self.drive
+        return np.asarray(self.constraint(q) @ v - self.drive)
 
-    def momentum(self, q: ArrayLike, v: ArrayLike) -> NDArray:
+    def momentum(self, q: ArrayLike, v: ArrayLike) -> Float:
         """p = M v, (m,)."""
         q, v = self._vectors(q, v)
-        return self.mass(q) @ v
+        return np.asarray(self.mass(q) @ v)
 
     def energy(self, q: ArrayLike, v: ArrayLike) -> float:
         """v.Mv/2 + V; constant if b = 0."""
         q, v = self._vectors(q, v)
         return 0.5 * float(v @ (self.mass(q) @ v)) + self.potential(q)
 
-    def _vectors(self, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, NDArray]:
+    def _vectors(self, q: ArrayLike, v: ArrayLike) -> tuple[Float, Float]:
         return tuple(checks.vector(name, given, len(self.names)) for name, given in (("q", q), ("v", v)))  # type: ignore[return-value]
 
 

@@ -14,9 +14,10 @@ lambda does no work: on the actual motion lambda.r. is what -e.lambda theta. tak
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.solution import Solution
 
 
@@ -36,7 +37,7 @@ class Slip:
     needed: float
 
 
-def friction_needed(run: Solution, weight: ArrayLike) -> NDArray:
+def friction_needed(run: Solution, weight: ArrayLike) -> Float:
     """The friction coefficient |lambda|/N that each disc needs at each frame, (F, n).
 
     Near free ends it grows with the number of discs, without a limit (see above): for what a rod needs take discs away from
@@ -55,7 +56,8 @@ def friction_needed(run: Solution, weight: ArrayLike) -> NDArray:
     if run.contact_force is None:
         raise ValueError('ground forces are needed; simulate with want=("contact_force",)')
     pressed = checks.field("weight", weight, run.x.shape[1], least=0.0, strict=True)
-    return np.hypot(run.contact_force[:, 0], run.contact_force[:, 1]) / pressed
+    needed: Float = np.hypot(run.contact_force[:, 0], run.contact_force[:, 1]) / pressed
+    return needed
 
 
 def first_slip(run: Solution, weight: ArrayLike, mu: ArrayLike) -> Slip | None:

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.mechanics import MechanicalSystem, Trajectory
 
 FRAMES = ("t", "q", "v", "multipliers", "energy", "residual")  # of a Trajectory
@@ -26,10 +27,10 @@ class Textbook:
     """
 
     system: MechanicalSystem
-    q: NDArray
-    v: NDArray
-    exact: Callable[[float], tuple[NDArray, NDArray, NDArray]] | None = None
-    invariants: dict[str, Callable[[NDArray, NDArray], float]] = field(default_factory=dict)
+    q: Float
+    v: Float
+    exact: Callable[[float], tuple[Float, Float, Float]] | None = None
+    invariants: dict[str, Callable[[Float, Float], float]] = field(default_factory=dict)
 
     def integrate(self, times: ArrayLike, rtol: float = 1e-11, **options: Any) -> Trajectory:
         """The motion of the start at t = 0, at times (F,), increasing, which may lie before and after it.
@@ -54,7 +55,7 @@ class Textbook:
         return _joined(parts)
 
 
-def _moment(t: NDArray) -> float:
+def _moment(t: Float) -> float:
     """A short time, for a motion of which only the start is asked for."""
     return 1e-6 * float(np.abs(t).max()) or 1e-6
 

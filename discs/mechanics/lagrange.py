@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.mechanics import MechanicalSystem
 from discs.problem import Problem
 from discs.solution import Solution
@@ -31,14 +31,14 @@ def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSyste
     starts = np.arange(0, 4 * n + 1, 2)
     inertia = scipy.sparse.diags_array(system.weights.ravel(), format="csr")
 
-    def shape(q: NDArray) -> Any:
+    def shape(q: Float) -> Any:
         return system.shape(q.reshape(rows, n))
 
-    def entries(diagonal: float, e: NDArray) -> "scipy.sparse.csr_array":
+    def entries(diagonal: float, e: Float) -> "scipy.sparse.csr_array":
         data = np.stack([np.full(2 * n, diagonal), -e.ravel()], axis=1).ravel()
         return scipy.sparse.csr_array((data, columns, starts), shape=(2 * n, m))
 
-    def filled(diagonal: float, e: NDArray) -> NDArray:
+    def filled(diagonal: float, e: Float) -> Float:
         a = np.zeros((2 * n, m))
         np.fill_diagonal(a, diagonal)
         a[np.arange(2 * n), columns[1::2]] = -e.ravel()
@@ -47,7 +47,7 @@ def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSyste
     moves, pieces = _moves(problem), _pieces(problem)
     mass, rolling = (inertia.toarray(), filled) if dense else (inertia, entries)
 
-    def symmetry(q: NDArray) -> NDArray:
+    def symmetry(q: Float) -> Float:
         generators = np.zeros((moves + len(pieces), rows, n))
         generators[0, 0] = generators[1, 1] = 1
         if moves == 3:
@@ -75,16 +75,17 @@ def _moves(problem: Problem) -> int:
     return 2 if np.any(problem.chain.shift) else 3
 
 
-def _pieces(problem: Problem) -> NDArray:
+def _pieces(problem: Problem) -> Float:
     """Pieces of the chain that torsion springs join, (pieces, n), one or zero."""
     n = problem.chain.n
     first = np.flatnonzero(problem.chain.torsion_stiffness)
     links = scipy.sparse.coo_array((np.ones(first.size), (first, (first + 1) % n)), shape=(n, n))
     count, piece = scipy.sparse.csgraph.connected_components(links, directed=False)
-    return (piece == np.arange(count)[:, None]).astype(float)
+    found: Float = (piece == np.arange(count)[:, None]).astype(float)
+    return found
 
 
-def frames(problem: Problem, run: Solution | None = None) -> tuple[NDArray, NDArray]:
+def frames(problem: Problem, run: Solution | None = None) -> tuple[Float, Float]:
     """Coordinates and velocities of a run with want=("velocity",), (F, m); of the problem's start without a run, (m,)."""
     system = problem.system
     if run is None:

@@ -28,9 +28,10 @@ Mech. Anal. 136 (1996) 21-99, section 4.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from discs.arrays import Float
 from discs.mechanics import MechanicalSystem
 from discs.mechanics.saddle import dense
 from discs.mechanics.sizes import units
@@ -50,14 +51,15 @@ class Momenta:
     section : (F, k, g), xi in the basis of `MechanicalSystem.symmetry`.
     """
 
-    t: NDArray
-    value: NDArray
-    rate: NDArray
-    section: NDArray
+    t: Float
+    value: Float
+    rate: Float
+    section: Float
 
-    def residual(self) -> NDArray:
+    def residual(self) -> Float:
         """value(t) - value(0) - integral of rate, (F, k): zero but for the method's error and that of a cubic spline in t."""
-        return self.value - self.value[0] - CubicSpline(self.t, self.rate).antiderivative()(self.t)
+        found: Float = self.value - self.value[0] - CubicSpline(self.t, self.rate).antiderivative()(self.t)
+        return found
 
 
 def symmetry_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> Momenta:
@@ -117,7 +119,7 @@ def nonholonomic_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v
     return Momenta(t, np.array(value), np.array(rate), np.array(section))
 
 
-def admissible_symmetries(system: MechanicalSystem, q: ArrayLike) -> NDArray:
+def admissible_symmetries(system: MechanicalSystem, q: ArrayLike) -> Float:
     """A basis of g^q, the symmetries xi with A xi_Q = 0 at q, (k, g)."""
     q = np.asarray(q, dtype=float)
     x = _generators(system, q)
@@ -125,7 +127,7 @@ def admissible_symmetries(system: MechanicalSystem, q: ArrayLike) -> NDArray:
     return np.linalg.svd(n)[2][_rank(system, q, n, x) :]
 
 
-def _rank(system: MechanicalSystem, q: NDArray, n: NDArray, x: NDArray) -> int:
+def _rank(system: MechanicalSystem, q: Float, n: Float, x: Float) -> int:
     """Rank of N = A X, whatever the units: rows of A and columns of X of norm 1 in coordinates of mass 1."""
     unit = units(system, q)
     rows = np.linalg.norm(dense(system.constraint(q)) * unit, axis=1)
@@ -134,18 +136,18 @@ def _rank(system: MechanicalSystem, q: NDArray, n: NDArray, x: NDArray) -> int:
     return int((np.linalg.svd(scaled, compute_uv=False) > RANK).sum())
 
 
-def _generators_rate(system: MechanicalSystem, q: NDArray, v: NDArray) -> NDArray:
+def _generators_rate(system: MechanicalSystem, q: Float, v: Float) -> Float:
     """dX/dq.v, X being affine in q."""
     return _generators(system, q + v) - _generators(system, q)
 
 
-def _generators(system: MechanicalSystem, q: NDArray) -> NDArray:
+def _generators(system: MechanicalSystem, q: Float) -> Float:
     if system.symmetry is None:
         raise ValueError("momenta belong to symmetries; give the system a symmetry, q -> X (m, g)")
     return system.symmetry(q)
 
 
-def _motion(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> tuple[NDArray, list[tuple[NDArray, NDArray]]]:
+def _motion(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> tuple[Float, list[tuple[Float, Float]]]:
     t, q, v = (np.asarray(given, dtype=float) for given in (t, q, v))
     shape = (t.size, len(system.names))
     if t.ndim != 1 or t.size < 4 or q.shape != shape or v.shape != shape:

@@ -10,14 +10,16 @@ reason.
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.mechanics.drift import Drift
 from discs.mechanics.equations import Equations
 from discs.mechanics.rank_drops import RankDrops
@@ -43,13 +45,13 @@ class Trajectory:
     Multipliers are nan at a moment when rows of A are dependent: they are not determined then.
     """
 
-    t: NDArray
-    q: NDArray
-    v: NDArray
-    multipliers: NDArray
-    energy: NDArray
-    residual: NDArray
-    mu: NDArray | None = None
+    t: Float
+    q: Float
+    v: Float
+    multipliers: Float
+    energy: Float
+    residual: Float
+    mu: Float | None = None
     stats: dict[str, Any] = field(default_factory=dict)
 
 
@@ -60,7 +62,7 @@ class Rate:
         self.system, self.m = system, len(system.names)
         self.trouble, self.evaluations = "", 0
 
-    def __call__(self, t: float, y: NDArray) -> NDArray:
+    def __call__(self, t: float, y: Float) -> Float:
         self.evaluations += 1
         if not np.isfinite(y).all():
             return np.full_like(y, np.nan)
@@ -75,9 +77,9 @@ class Rate:
 
 def integrate(
     system: Equations,
-    q: NDArray,
-    v: NDArray,
-    mu: NDArray | None,
+    q: Float,
+    v: Float,
+    mu: Float | None,
     times: ArrayLike,
     method: str,
     rtol: float,
@@ -126,13 +128,13 @@ def _within_reach(system: Equations, rtol: float) -> float:
 
 def _follow(
     system: Equations,
-    start: NDArray,
-    times: NDArray,
+    start: Float,
+    times: Float,
     method: str,
     rtol: float,
-    atol: NDArray | None,
+    atol: Float | None,
     progress: bool,
-) -> tuple[NDArray, dict[str, Any]]:
+) -> tuple[Float, dict[str, Any]]:
     """(q, v, mu) at all times, and statistics."""
     from tqdm import tqdm
 
@@ -146,17 +148,17 @@ def _follow(
     found[0], steps, moments = start, 0, []
     recent: deque[float] = deque([times[0]], maxlen=STALLED)
 
-    def absolute(y: NDArray) -> NDArray:
+    def absolute(y: Float) -> Float:
         return 1e-3 * rtol * sizes.of(y) if atol is None else atol
 
-    def solver_from(t: float, y: NDArray, step: float | None = None) -> Any:
+    def solver_from(t: float, y: Float, step: float | None = None) -> "scipy.integrate.OdeSolver":
         first = None if step is None else min(step, abs(end - t))
         made = getattr(scipy.integrate, kind)(rate, t, y, end, rtol=rtol, atol=absolute(y), first_step=first)
         if hasattr(made, "h_abs") and not made.h_abs > 0:  # the rate was nan where SciPy looked for a first step
             made.h_abs = 1e-6 * abs(end - t)
         return made
 
-    def record(until: float, between: Any) -> None:
+    def record(until: float, between: Callable[[float], Float]) -> None:
         nonlocal done
         while done < times.size and direction * (times[done] - until) <= 0:
             found[done] = between(times[done])
@@ -213,7 +215,7 @@ def _follow(
     return found, {"method": kind, "rtol": rtol, "steps": steps, "evaluations": rate.evaluations, "rank_drops": moments}
 
 
-def _reason(solver: Any, rate: Rate, ranks: RankDrops, said: str | None) -> str:
+def _reason(solver: "scipy.integrate.OdeSolver", rate: Rate, ranks: RankDrops, said: str | None) -> str:
     """Why a motion ends."""
     if why := ranks.words() or rate.trouble:
         return why
@@ -222,7 +224,7 @@ def _reason(solver: Any, rate: Rate, ranks: RankDrops, said: str | None) -> str:
     return f"steps have come down to {abs(solver.step_size):.1g}; take a larger rtol, or a method for stiff problems"
 
 
-def _trajectory(system: Equations, t: NDArray, found: NDArray, charged: bool, stats: dict[str, Any]) -> Trajectory:
+def _trajectory(system: Equations, t: Float, found: Float, charged: bool, stats: dict[str, Any]) -> Trajectory:
     m = len(system.names)
     path, speed, charges = np.split(found, [m, 2 * m], axis=1)
     multipliers = np.full((t.size, len(system.owners)), np.nan)

@@ -8,9 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.mechanics import MechanicalSystem
 from discs.mechanics.known import Textbook, finite, positive
 
@@ -66,7 +67,7 @@ def driven_oscillator(
     positive(mass=mass, stiffness=stiffness, driver_mass=driver_mass, wave=wave)
     finite(skew=skew, speed=speed, drift=drift)
 
-    def hill(y: NDArray) -> NDArray:
+    def hill(y: Float) -> Float:
         return wave * (np.cos(y) + 0.5 * skew * np.sin(2 * y))
 
     start = checks.vector("q", q, 3)
@@ -80,8 +81,8 @@ def driven_oscillator(
 def _driven(
     names: tuple[str, ...],
     parameters: tuple[float, float, float],
-    hill: Callable[[NDArray], NDArray],
-    gear: Callable[[NDArray], Any],
+    hill: Callable[[Float], Float],
+    gear: Callable[[Float], Any],
     q: ArrayLike,
     speed: float,
     drift: float,
@@ -97,7 +98,7 @@ def _driven(
         ("oscillator",),
     )
     chi = np.arctan(gear(start[1]))
-    invariants: dict[str, Callable[[NDArray, NDArray], float]] = {
+    invariants: dict[str, Callable[[Float, Float], float]] = {
         "driver": lambda q, v: float(0.5 * driver * v[1] ** 2 + hill(q[1])),
         "oscillator": lambda q, v: 0.5 * float(mass * (v[0] ** 2 + v[2] ** 2) + stiffness * (q[0] ** 2 + q[2] ** 2)),
     }

@@ -14,12 +14,12 @@ shorter. Other rows have the errors of the steps; a motion that misses by more t
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.mechanics.drift import Drift
 from discs.mechanics.equations import Equations
 from discs.mechanics.saddle import dense
@@ -36,8 +36,8 @@ class Passage(NamedTuple):
 
     moment: float
     end: float
-    y: NDArray
-    between: Callable[[float], NDArray]
+    y: Float
+    between: Callable[[float], Float]
 
 
 class RankDrops:
@@ -52,16 +52,16 @@ class RankDrops:
         self.watched = 0 < len(system.owners) * len(system.names) <= LARGEST
         self.sigma, self.largest, self.owners, self.held = np.inf, 0.0, "", True
         self.tried = np.inf
-        self.rows: NDArray | None = None  # A of the last state, scaled
+        self.rows: Float | None = None  # A of the last state, scaled
 
-    def crossed(self, y: NDArray) -> bool:
+    def crossed(self, y: Float) -> bool:
         """Whether det(A A_0^T), A_0 of the last state, is negative: a step went over dependent rows unasked."""
         if not self.watched or self.rows is None or not np.isfinite(y).all():
             return False
         rows = dense(self.system.constraint(y[: self.m])) * self.sizes.unit
         return bool(np.linalg.det((rows / self._norms()) @ self.rows.T) < 0)
 
-    def _norms(self) -> NDArray:
+    def _norms(self) -> Float:
         return np.where(self.norms > 0, self.norms, 1.0)[:, None]
 
     def words(self) -> str:
@@ -74,7 +74,9 @@ class RankDrops:
             "large to tell which is its own; take a smaller rtol, or stop before"
         )
 
-    def passage(self, rate: Callable[[float, NDArray], NDArray], solver: Any, direction: float, rtol: float) -> Passage | None:
+    def passage(
+        self, rate: Callable[[float, Float], Float], solver: "scipy.integrate.OdeSolver", direction: float, rtol: float
+    ) -> Passage | None:
         """A step over a moment of dependent rows less than a step away; None if there is none, or no smooth way over it."""
         if not self.watched:
             return None
@@ -102,7 +104,7 @@ class RankDrops:
         """Whether rows that drift are so near to dependent that no step can be trusted."""
         return self.watched and not self.held and self.sigma < NEAR * self.largest
 
-    def _time_to_zero(self, y: NDArray, direction: float) -> float:
+    def _time_to_zero(self, y: Float, direction: float) -> float:
         q, v = y[: self.m], y[self.m : 2 * self.m]
         rows = dense(self.system.constraint(q)) * self.sizes.unit
         self.norms = np.maximum(self.norms, np.linalg.norm(rows, axis=1))
@@ -120,9 +122,7 @@ class RankDrops:
         return self.sigma / falls if falls > 0 else np.inf
 
 
-def _steps(
-    rate: Callable[[float, NDArray], NDArray], y: NDArray, times: tuple[float, ...]
-) -> tuple[NDArray, Callable[[float], NDArray]]:
+def _steps(rate: Callable[[float, Float], Float], y: Float, times: tuple[float, ...]) -> tuple[Float, Callable[[float], Float]]:
     """DOP853 by given steps, whatever their error."""
     for a, b in pairwise(times):
         most = 1e6 * (1 + np.abs(y).max())

@@ -5,22 +5,22 @@ rows of norm 1, to the next power of two; in other units of length, mass and tim
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
+
+from discs.arrays import Float, Matrix
 
 SINGULAR = 1e-12  # pivots and ranks below this, relative to the largest, are looked into
 ASYMMETRY = 1e-10  # of M, relative to the root of both diagonal entries
 
 
-def dense(a: Any) -> NDArray:
+def dense(a: Matrix) -> Float:
     """An array of what may be sparse."""
     return a.toarray() if scipy.sparse.issparse(a) else np.asarray(a)
 
 
-def matrix(m: Any, a: Any) -> Any:
+def matrix(m: Matrix, a: Matrix) -> Matrix:
     """[[M, A^T], [A, 0]] of m (k, k) and a (c, k), sparse if A is."""
     if not scipy.sparse.issparse(a):
         return np.block([[m, a.T], [a, np.zeros((len(a), len(a)))]])
@@ -31,7 +31,7 @@ def matrix(m: Any, a: Any) -> Any:
     return scipy.sparse.coo_array((np.concatenate([m.data, a.data, a.data]), places), shape=(size, size)).tocsc()
 
 
-def solve(m: Any, a: Any, f: NDArray, g: NDArray, names: Sequence[str], owners: Sequence[str]) -> tuple[NDArray, NDArray]:
+def solve(m: Matrix, a: Matrix, f: Float, g: Float, names: Sequence[str], owners: Sequence[str]) -> tuple[Float, Float]:
     """u (k,) and lambda (c,) of m (k, k), a (c, k), f (k,), g (c,).
 
     ValueError with what makes them undetermined, by the `names` of coordinates (k,) and the `owners` of rows (c,).
@@ -50,7 +50,7 @@ def solve(m: Any, a: Any, f: NDArray, g: NDArray, names: Sequence[str], owners: 
     return unknowns[: len(f)], -unknowns[len(f) :]
 
 
-def check(m: Any, a: Any, f: NDArray, g: NDArray, names: Sequence[str], owners: Sequence[str]) -> None:
+def check(m: Matrix, a: Matrix, f: Float, g: Float, names: Sequence[str], owners: Sequence[str]) -> None:
     """ValueError unless all is finite, M symmetric, and positive definite on velocities that A allows."""
     for what, given in (("M", m), ("A", a), ("the force", f), ("the constraints' side A u =", g)):
         entries = given.data if scipy.sparse.issparse(given) else given
@@ -69,7 +69,7 @@ def check(m: Any, a: Any, f: NDArray, g: NDArray, names: Sequence[str], owners: 
     _inertia(m, a, names)
 
 
-def symmetric(m: Any, names: Sequence[str]) -> None:
+def symmetric(m: Matrix, names: Sequence[str]) -> None:
     """ValueError unless M is symmetric, with the entries that differ most."""
     diagonal = m.diagonal()
     if np.count_nonzero(diagonal) == _count(m):
@@ -88,12 +88,12 @@ def symmetric(m: Any, names: Sequence[str]) -> None:
         )
 
 
-def _count(m: Any) -> int:
+def _count(m: Matrix) -> int:
     """Entries that are not zero."""
     return int(m.count_nonzero() if scipy.sparse.issparse(m) else np.count_nonzero(m))
 
 
-def rank(rows: NDArray) -> int:
+def rank(rows: Float) -> int:
     """Rank of rows (c, k), each of them and then each column scaled to a largest entry near 1."""
     if not rows.size or not rows.any():
         return 0
@@ -104,7 +104,7 @@ def rank(rows: NDArray) -> int:
     return int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
 
 
-def explain(m: Any, a: Any, g: NDArray, names: Sequence[str], owners: Sequence[str]) -> None:
+def explain(m: Matrix, a: Matrix, g: Float, names: Sequence[str], owners: Sequence[str]) -> None:
     """Raise ValueError with what makes the saddle point singular, part by part of constraints that share coordinates."""
     d = scales(m, a)
     a = scipy.sparse.diags_array(d[len(names) :]) @ scipy.sparse.csr_array(a) @ scipy.sparse.diags_array(d[: len(names)])
@@ -128,7 +128,7 @@ def explain(m: Any, a: Any, g: NDArray, names: Sequence[str], owners: Sequence[s
     _inertia(m, a, names, d)
 
 
-def _inertia(m: Any, a: Any, names: Sequence[str], d: NDArray | None = None) -> None:
+def _inertia(m: Matrix, a: Matrix, names: Sequence[str], d: Float | None = None) -> None:
     """ValueError unless M is positive definite on the kernel of A; with `d`, A is scaled by it already."""
     if d is None:
         d = scales(m, a)
@@ -145,7 +145,7 @@ def _inertia(m: Any, a: Any, names: Sequence[str], d: NDArray | None = None) -> 
         raise ValueError(f"M must be positive on velocities that the constraints allow; {what} against {worst}")
 
 
-def scales(m: Any, a: Any) -> NDArray:
+def scales(m: Matrix, a: Matrix) -> Float:
     """d (k + c,), powers of two: coordinates near mass 1, rows near norm 1 in them.
 
     A coordinate without mass is scaled by the rows that it takes part in.
@@ -159,17 +159,18 @@ def scales(m: Any, a: Any) -> NDArray:
         d = np.where(mass > 0, d, 1 / np.where(reach > 0, reach, 1.0))
         norms = size @ d
         r = 1 / np.where(norms > 0, norms, 1.0)
-    return np.exp2(np.round(np.log2(np.concatenate([d, np.where(r > 0, r, 1.0)]))))
+    found: Float = np.exp2(np.round(np.log2(np.concatenate([d, np.where(r > 0, r, 1.0)]))))
+    return found
 
 
-def _scaled(whole: Any, d: NDArray) -> Any:
+def _scaled(whole: Matrix, d: Float) -> Matrix:
     """D S D."""
     if scipy.sparse.issparse(whole):
         return (scipy.sparse.diags_array(d) @ whole @ scipy.sparse.diags_array(d)).asformat(whole.format)
     return whole * d * d[:, None]
 
 
-def _factors(given: Any) -> tuple[NDArray, Callable[[NDArray], NDArray]]:
+def _factors(given: Matrix) -> tuple[Float, Callable[[Float], Float]]:
     """Pivots of a matrix, in size, and what solves with it."""
     if scipy.sparse.issparse(given):
         try:

@@ -4,19 +4,17 @@ A velocity has the size sqrt(2 T/M_kk), T the largest kinetic energy so far; a c
 charge mu_a of the vakonomic equations sqrt(2 T)/|A_a|, |A_a| the row's norm in coordinates of mass 1.
 """
 
-from typing import Any
-
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
 
+from discs.arrays import Float, Matrix
 from discs.mechanics.equations import Equations
 from discs.mechanics.saddle import dense
 
 TINY = float(np.finfo(float).tiny)
 
 
-def units(system: Equations, q: NDArray) -> NDArray:
+def units(system: Equations, q: Float) -> Float:
     """1/sqrt(M_kk), (m,): the speed of each coordinate at kinetic energy 1/2.
 
     Of a coordinate without inertia of its own: the largest that the constraints give it at that energy.
@@ -24,17 +22,18 @@ def units(system: Equations, q: NDArray) -> NDArray:
     mass = system.mass(q)
     diagonal = mass.diagonal()
     if (diagonal > 0).all():
-        return 1 / np.sqrt(diagonal)
+        return np.asarray(1 / np.sqrt(diagonal))
     kernel = scipy.linalg.null_space(dense(system.constraint(q)))
     reduced = np.linalg.inv(kernel.T @ (mass @ kernel))
     speeds = np.sqrt(np.maximum(np.einsum("kb,bc,kc->k", kernel, reduced, kernel), 0))
     return np.where(diagonal > 0, 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)), speeds)
 
 
-def residual_size(system: Equations, q: NDArray, v: NDArray) -> NDArray:
+def residual_size(system: Equations, q: Float, v: Float) -> Float:
     """What A v - b is compared with, (c,): the sum of |A_ik| times the size of v_k, and |b|."""
     size = units(system, q) * _norm(system.mass(q), v)
-    return abs(system.constraint(q)) @ np.maximum(size, np.abs(v)) + np.abs(system.drive)
+    found: Float = abs(system.constraint(q)) @ np.maximum(size, np.abs(v)) + np.abs(system.drive)
+    return found
 
 
 class Sizes:
@@ -43,7 +42,7 @@ class Sizes:
     unit : (m,), see `units`; speed : sqrt(2 T), the largest so far; shift : (m,), the largest displacement so far.
     """
 
-    def __init__(self, system: Equations, y: NDArray, rate: NDArray, span: float) -> None:
+    def __init__(self, system: Equations, y: Float, rate: Float, span: float) -> None:
         self.system, self.m, self.start = system, len(system.names), y[: len(system.names)]
         self.unit = units(system, self.start)
         mass = system.mass(self.start)
@@ -52,12 +51,12 @@ class Sizes:
         self.speed = max(speed, pull * time)
         self.shift = np.maximum(self.unit * self.speed * time, TINY)
 
-    def update(self, y: NDArray) -> None:
+    def update(self, y: Float) -> None:
         q, v = y[: self.m], y[self.m : 2 * self.m]
         self.speed = max(self.speed, _norm(self.system.mass(q), v))
         self.shift = np.maximum(self.shift, np.abs(q - self.start))
 
-    def of(self, y: NDArray) -> NDArray:
+    def of(self, y: Float) -> Float:
         """Sizes of the entries of y, (2m,) or (2m + c,)."""
         parts = [self.shift, np.maximum(self.unit * self.speed, TINY)]
         if len(y) > 2 * self.m:
@@ -66,6 +65,6 @@ class Sizes:
         return np.concatenate(parts)
 
 
-def _norm(mass: Any, v: NDArray) -> float:
+def _norm(mass: Matrix, v: Float) -> float:
     """sqrt(v.Mv)."""
     return float(np.sqrt(max(float(v @ (mass @ v)), 0.0)))

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
+
+from discs.arrays import Float
 
 LIMIT, SHOWN, CALM = 6.1, 15, 6
 PAUSE = 1000  # steps to the next trial
@@ -26,7 +27,7 @@ class Stiffness:
         self.limited = self.free = self.pause = 0
         self.steps: deque[float] = deque(maxlen=20)
 
-    def shown(self, solver: Any) -> bool:
+    def shown(self, solver: "scipy.integrate.OdeSolver") -> bool:
         """Whether steps up to the last one of `solver` are limited by stability."""
         h = solver.step_size
         self.steps.append(abs(h))
@@ -44,7 +45,7 @@ class Stiffness:
                 self.limited = 0
         return self.limited >= SHOWN
 
-    def implicit_step(self, rate: Any, solver: Any, rtol: float, atol: NDArray) -> float | None:
+    def implicit_step(self, rate: Any, solver: "scipy.integrate.OdeSolver", rtol: float, atol: Float) -> float | None:
         """A step of Radau from where `solver` is, if Radau gets further for each evaluation of the rate; else None."""
         self.limited, self.free, self.pause = 0, 0, PAUSE
         first = min(abs(solver.step_size), abs(solver.t_bound - solver.t))

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.mechanics import motion, saddle
 from discs.mechanics.derivatives import Formula, ShapeError
 from discs.mechanics.equations import Equations, names_of
@@ -28,12 +29,12 @@ class MechanicalSystem(Equations):
     def from_lagrangian(
         cls,
         names: Sequence[str],
-        mass: Callable[[NDArray], ArrayLike] | ArrayLike,
-        potential: Callable[[NDArray], Any],
-        constraint: Callable[[NDArray], ArrayLike],
+        mass: Callable[[Float], ArrayLike] | ArrayLike,
+        potential: Callable[[Float], Any],
+        constraint: Callable[[Float], ArrayLike],
         owners: Sequence[str],
         drive: ArrayLike = 0.0,
-        symmetry: Callable[[NDArray], ArrayLike] | None = None,
+        symmetry: Callable[[Float], ArrayLike] | None = None,
     ) -> "MechanicalSystem":
         """A system from M (or M(q)), V(q) and A(q), formulas that take q (m,) and return numbers.
 
@@ -67,7 +68,7 @@ class MechanicalSystem(Equations):
         if constant is not None:
             saddle.symmetric(constant, names)
 
-        def force(q: NDArray, v: NDArray) -> NDArray:
+        def force(q: Float, v: Float) -> Float:
             f = -height.slopes(q)
             if constant is None:
                 slopes = inertia.slopes(q)  # dM_ij/dq_k
@@ -150,7 +151,7 @@ class MechanicalSystem(Equations):
         return motion.integrate(self, q, v, charges, times, method, rtol, atol, progress)
 
 
-def _of_q(name: str, formula: Callable[[NDArray], Any]) -> Callable[[NDArray], Any]:
+def _of_q(name: str, formula: Callable[[Float], Any]) -> Callable[[Float], Any]:
     """`formula`, which must take q alone."""
     if not callable(formula):
         raise ValueError(f"{name} must be a function of q; got {formula!r}")

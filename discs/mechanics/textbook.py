@@ -14,10 +14,10 @@ Oscillators that drive one another are in `discs.mechanics.oscillators`.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from discs import checks
+from discs.arrays import Float
 from discs.mechanics import MechanicalSystem
 from discs.mechanics.known import Textbook, finite, nonzero, positive
 
@@ -59,10 +59,10 @@ def rolling_disc(
     turn = nonzero("turn_rate", turn_rate, "the disc then rolls on a straight line")
     m, a, r, pull = mass, spin_inertia, radius, mass * slope
 
-    def constraint(q: NDArray) -> list[list[complex]]:
+    def constraint(q: Float) -> list[list[complex]]:
         return [[1, 0, r * np.sin(q[3]), 0], [0, 1, -r * np.cos(q[3]), 0]]
 
-    def symmetry(q: NDArray) -> NDArray:
+    def symmetry(q: Float) -> Float:
         if slope:  # along the contour lines, in theta, and in phi
             return np.eye(4)[:, 1:]
         return np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [-q[1], q[0], 0, 1]]).T
@@ -78,7 +78,7 @@ def rolling_disc(
     c = r * pull / ((a + m * r**2) * turn)
     b = roll_rate - c * np.cos(heading)
 
-    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+    def exact(t: float) -> tuple[Float, Float, Float]:
         phi = heading + turn * t
         cos, sin = np.cos(phi), np.sin(phi)
         rate, change = b + c * cos, -c * turn * sin
@@ -120,7 +120,7 @@ def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_
     c = slope / turn
     b = speed - c * np.sin(heading)
 
-    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+    def exact(t: float) -> tuple[Float, Float, Float]:
         phi = heading + turn * t
         u = b + c * np.sin(phi)
         x, y = np.array(_slope_drift(b, c, phi, heading)) / turn
@@ -152,11 +152,11 @@ def chaplygin_sleigh(
     a = nonzero("offset", offset, "a knife edge without slope")
     turn = nonzero("turn_rate", turn_rate, "the sleigh then runs straight")
 
-    def metric(q: NDArray) -> NDArray:
+    def metric(q: Float) -> Float:
         s, c = -mass * a * np.sin(q[2]), mass * a * np.cos(q[2])
         return np.array([[mass, 0 * s, s], [0 * s, mass, c], [s, c, inertia + mass * a**2]])
 
-    def symmetry(q: NDArray) -> NDArray:
+    def symmetry(q: Float) -> Float:
         return np.array([[1.0, 0.0, -q[1]], [0.0, 1.0, q[0]], [0.0, 0.0, 1.0]])
 
     system = MechanicalSystem.from_lagrangian(
@@ -174,7 +174,7 @@ def chaplygin_sleigh(
         rate = np.sign(turn) * top * np.sqrt(mass / j) / np.cosh(tau)
         return heading + np.sign(turn) * np.sqrt(j / mass) / a * (gd(tau) - gd(first)), top * np.tanh(tau), rate
 
-    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+    def exact(t: float) -> tuple[Float, Float, Float]:
         def way(direction: Callable[[float], float]) -> float:
             """Integral of tanh tau times the direction from the start; the tolerance is that of a number near 1."""
 
@@ -219,7 +219,7 @@ def nonholonomic_particle(mass: float, width: float, *, y: float, velocity: tupl
 
     c = velocity[0] * root(y)
 
-    def exact(t: float) -> tuple[NDArray, NDArray, NDArray]:
+    def exact(t: float) -> tuple[Float, Float, Float]:
         now = y + run * t
         x = c * b / run * (np.arcsinh(now / b) - np.arcsinh(y / b))
         z, rate = c * b / run * (root(now) - root(y)), c / root(now)

@@ -37,10 +37,11 @@ many, and nonholonomic.
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import null_space
 
 from discs import checks
+from discs.arrays import Float
 from discs.mechanics import MechanicalSystem, Trajectory
 from discs.mechanics.lagrange import frames, lagrange_dalembert
 from discs.mechanics.saddle import dense
@@ -70,7 +71,7 @@ def solve(
     return system.integrate(q, v, times, tol, mu, **options)
 
 
-def agreeing_multipliers(system: MechanicalSystem, q: ArrayLike, v: ArrayLike) -> NDArray:
+def agreeing_multipliers(system: MechanicalSystem, q: ArrayLike, v: ArrayLike) -> Float:
     """Basis (c, d) of the mu(0) with which the vakonomic acceleration at q, v is the nonholonomic one: N^T G mu = 0.
 
     N spans the admissible displacements, the null space of A. For a disc that turns or rolls, d = 1 of c = 2: the mu across its
@@ -123,11 +124,11 @@ def rolling_disc(
 
     inertia = np.diag([m, m, spin, turn])
 
-    def constraint(q: NDArray) -> NDArray:
+    def constraint(q: Float) -> Float:
         cos, sin = np.cos(q[3]), np.sin(q[3])
         return np.array([[1.0, 0.0, radius * sin, 0.0], [0.0, 1.0, -radius * cos, 0.0]])
 
-    def constraint_rate(q: NDArray, v: NDArray) -> NDArray:
+    def constraint_rate(q: Float, v: Float) -> Float:
         rate = np.zeros((2, 4))
         rate[:, 2] = radius * np.cos(q[3]) * v[3], radius * np.sin(q[3]) * v[3]
         return rate
@@ -144,6 +145,6 @@ def rolling_disc(
     )
 
 
-def of_chain(problem: Problem) -> tuple[MechanicalSystem, NDArray, NDArray]:
+def of_chain(problem: Problem) -> tuple[MechanicalSystem, Float, Float]:
     """A `Chain` or `SteeredChain` of a few discs with its initial q, v (rows*N,), in the order of `lagrange_dalembert`."""
     return lagrange_dalembert(problem, dense=True), *frames(problem)

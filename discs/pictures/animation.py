@@ -16,10 +16,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from discs import checks
+from discs.arrays import Array, Float
 from discs.pictures import geometry
 from discs.pictures.style import BLUE, GREY, GROUND, INK, ORANGE, PALE
 from discs.solution import Solution
@@ -79,7 +79,7 @@ def animate(
     return path
 
 
-def _write_mp4(path: Path, pictures: Iterator[NDArray], fps: float, size: tuple[int, int]) -> None:
+def _write_mp4(path: Path, pictures: Iterator[Array], fps: float, size: tuple[int, int]) -> None:
     import imageio_ffmpeg  # looks for its program when imported
 
     with closing(imageio_ffmpeg.write_frames(str(path), size, "rgba", fps=fps, quality=8, macro_block_size=2)) as writer:
@@ -88,7 +88,7 @@ def _write_mp4(path: Path, pictures: Iterator[NDArray], fps: float, size: tuple[
             writer.send(picture)
 
 
-def _write_gif(path: Path, pictures: Iterator[NDArray], fps: float, size: tuple[int, int]) -> None:
+def _write_gif(path: Path, pictures: Iterator[Array], fps: float, size: tuple[int, int]) -> None:
     from PIL import Image
 
     palette = Image.fromarray(begin := next(pictures)).convert("RGB").quantize(64)
@@ -125,9 +125,9 @@ class Stage:
         self._tracks = self._flat(contacts).swapaxes(0, 1)
         self._set_up()
 
-    def _flat(self, points: NDArray) -> NDArray:
+    def _flat(self, points: Float) -> Float:
         """Points (..., 3) on the screen, (..., 2)."""
-        return points @ self._screen.T
+        return np.asarray(points @ self._screen.T)
 
     def _set_up(self) -> None:
         scale = self.size[0] / 1280
@@ -158,7 +158,7 @@ class Stage:
         self._canvas.draw()
         self._behind = self._canvas.copy_from_bbox(figure.bbox)
 
-    def _ground(self, low: NDArray, high: NDArray, scale: float) -> LineCollection:
+    def _ground(self, low: Float, high: Float, scale: float) -> LineCollection:
         """Lines of the plane, at a round spacing."""
         power = 10 ** np.floor(np.log10(np.max(high - low) / 8))
         step = next(m * power for m in (1, 2, 5, 10) if m * power >= np.max(high - low) / 12)
@@ -167,7 +167,7 @@ class Stage:
         lines = [[(x, ys[0], 0), (x, ys[-1], 0)] for x in xs] + [[(xs[0], y, 0), (xs[-1], y, 0)] for y in ys]
         return LineCollection(list(self._flat(np.array(lines))), colors=GROUND, linewidths=1.2 * scale)
 
-    def picture(self, f: int) -> NDArray:
+    def picture(self, f: int) -> Array:
         """Frame f of the run, counted from the end if negative; (height, width, 4) bytes, red, green, blue and opacity."""
         f = range(self.run.t.size)[f]
         self._tracked.set_segments(list(self._tracks[:, : f + 1]))
@@ -184,10 +184,11 @@ class Stage:
         r = np.stack([run.x[f], run.y[f], np.full(run.s.size, radius)], axis=-1)
         forward = np.append(self._forward[f].T, np.zeros((run.s.size, 1)), axis=1)[self.shown]
 
-        def rim(angle: NDArray) -> NDArray:
+        def rim(angle: Float) -> Float:
             """Points of the discs' rims, (discs, angles, 3), by the angle from above towards where they roll."""
             up = np.array([0, 0, 1.0])
-            return r[self.shown, None] + radius * (np.sin(angle)[..., None] * forward[:, None] + np.cos(angle)[..., None] * up)
+            around: Float = np.sin(angle)[..., None] * forward[:, None] + np.cos(angle)[..., None] * up
+            return r[self.shown, None] + radius * around
 
         at = r[self.shown]
         tips = rim(run.theta[f, self.shown, None] + SPOKES)

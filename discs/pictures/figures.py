@@ -1,6 +1,6 @@
 """Pictures of the discs. Every function draws into the axes it is given, or new ones, and returns them; nothing opens a window."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -139,7 +139,7 @@ def energy_error(run: Solution, ax: Axes | None = None) -> Axes:
     return ax
 
 
-PANELS = {
+PANELS: dict[str, Callable[[Solution, Axes], Axes]] = {
     "motion": motion,
     "theta": lambda run, ax: spacetime(run, "theta", ax),
     "omega": lambda run, ax: spacetime(run, "omega", ax),

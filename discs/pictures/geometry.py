@@ -8,9 +8,9 @@ r. = R omega J d_1). The spoke that points up at theta = 0 is the paper's direct
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float, Int
 from discs.mechanics import Trajectory
 from discs.solution import Solution
 
@@ -26,7 +26,7 @@ def is_ring(run: Solution) -> bool:
     return bool((np.hypot(*(r[..., -1] - r[..., 0])) <= 2 * longest).all())
 
 
-def slopes(run: Solution) -> NDArray:
+def slopes(run: Solution) -> Float:
     """r', (F, 2, N): as recorded (want "slope"), or by central differences of the positions, one-sided at free ends.
 
     One disc has no line; its slope is that of a rod that its axle follows.
@@ -37,11 +37,12 @@ def slopes(run: Solution) -> NDArray:
         return axles(run)
     r = np.stack([run.x, run.y], axis=1)
     if is_ring(run):
-        return (np.roll(r, -1, axis=2) - np.roll(r, 1, axis=2)) / (2 * (run.s[1] - run.s[0]))
-    return np.gradient(r, run.s, axis=2, edge_order=2 if run.s.size > 2 else 1)
+        return np.asarray((np.roll(r, -1, axis=2) - np.roll(r, 1, axis=2)) / (2 * (run.s[1] - run.s[0])))
+    slope: Float = np.gradient(r, run.s, axis=2, edge_order=2 if run.s.size > 2 else 1)
+    return slope
 
 
-def axles(run: Solution) -> NDArray:
+def axles(run: Solution) -> Float:
     """Unit vectors d_1 along the axles, (F, 2, N); zero where r' is."""
     if run.phi is not None:
         return np.stack([np.cos(run.phi), np.sin(run.phi)], axis=1)
@@ -52,12 +53,12 @@ def axles(run: Solution) -> NDArray:
     return np.divide(slope, length, out=np.zeros_like(slope), where=length > 0)
 
 
-def turn(vectors: NDArray) -> NDArray:
+def turn(vectors: Float) -> Float:
     """J (x, y) = (-y, x) for vectors (..., 2, N)."""
     return np.stack([-vectors[..., 1, :], vectors[..., 0, :]], axis=-2)
 
 
-def picked(s: NDArray, about: int) -> NDArray:
+def picked(s: Float, about: int) -> Int:
     """Indices of about so many discs to draw: those nearest to equally spaced places, or all of fewer than twice as many."""
     if s.size < 2 * about:
         return np.arange(s.size)
@@ -65,7 +66,7 @@ def picked(s: NDArray, about: int) -> NDArray:
     return np.unique(np.abs(s[:, None] - places).argmin(axis=0))
 
 
-def instants(run: Solution, count: int) -> NDArray:
+def instants(run: Solution, count: int) -> Int:
     """Indices of at most `count` frames, equally spaced with the first and the last."""
     return np.unique(np.linspace(0, run.t.size - 1, count).round().astype(int))
 
@@ -129,7 +130,7 @@ def off_between_frames(run: Solution, radius: float) -> float:
     return float((turned + moved / radius).max())
 
 
-def _quarter(h: NDArray, change: NDArray, rate: NDArray) -> NDArray:
+def _quarter(h: Float, change: Float, rate: Float) -> Float:
     return 0.25 * np.maximum(np.abs(h * rate[:-1] - change), np.abs(h * rate[1:] - change))
 
 
