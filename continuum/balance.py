@@ -38,7 +38,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from continuum.rod import Rod, SteeredRod
 from discs import Solution, checks
-from discs.chains.chain import ROLLING
+from discs.chains.rolling import ROLLING
 
 DEGREE = 7
 LAWS = ("energy", "momentum_x", "momentum_y", "theta_momentum", "angular_momentum", "material_momentum")
@@ -71,7 +71,7 @@ def balances(
     rod : with linear curvature.
     run : from `solve` or `simulate`, or from `free_rod`; at least 8 nodes, and 3 frames near to each other: the error of d_t is of
         the order of their distance squared.
-    rolling : "field" or "unit", or None for the free rod.
+    rolling : a name in `discs.chains.rolling`, "field" or "unit", or None for the free rod.
     closed, shift : of the scene.
 
     Returns
@@ -108,14 +108,10 @@ def balances(
         v, p = np.stack([run.x_rate, run.y_rate]), _at_nodes(run.s, run.tension, period)
         e = force = np.zeros_like(r)
     else:
-        checks.choice("rolling", rolling, ROLLING)
-        size = np.hypot(*r1) if rolling == "unit" else 1.0
-        e, p = rod.radius * _turned(r1) / size, np.zeros_like(omega)
+        law = ROLLING[checks.choice("rolling", rolling, ROLLING)]
+        e, p = law.arm(rod.radius, r1) * _turned(r1), np.zeros_like(omega)
         v = e * omega
-        tangent = along(v)
-        if rolling == "unit":  # only the part across r' turns the heading
-            tangent = (tangent - r1 * (_dot(r1, tangent) / size**2)) / size
-        e_rate = rod.radius * _turned(tangent)
+        e_rate = rod.radius * _turned(law.rate(r1, along(v)))
         torque = beta * along(run.theta, 2) - bend * _dot(e, r4) - rho * omega * _dot(e, e_rate)
         force = rho * (e * torque / (alpha + rho * _dot(e, e)) + e_rate * omega) + bend * r4
     n = p * r1 - bend * r3

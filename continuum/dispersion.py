@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from continuum.rod import Rod, SteeredRod
 from discs import checks
-from discs.chains.chain import ROLLING
+from discs.chains.rolling import ROLLING, stretching
 
 
 class Symbols(NamedTuple):
@@ -38,24 +38,26 @@ def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> NDArray:
 def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: float | None = None) -> NDArray:
     """Largest growth rate sigma of a perturbation of wave number q of the straight rod rolling sideways at rate omega.
 
-    Field law, with M = alpha + rho R^2: the positive root of
+    With M = alpha + rho R^2 and gamma = `stretching(law)`, 1 under the field law and 0 under the unit law, the largest real part of
 
-        M sigma^4 + sigma^2 [beta q^2 + K R^2 q^4 - alpha R^2 omega^2 q^2] - beta R^2 omega^2 q^4 = 0;
+        M sigma^4 + sigma^2 [beta q^2 + K R^2 q^4 - gamma alpha R^2 omega^2 q^2] - gamma beta R^2 omega^2 q^4 = 0.
 
-    sigma -> omega sqrt(beta/K) as q -> infinity, unbounded in q if K = 0. Unit law: zero.
+    To first order in r = (s + xi, R omega t + eta), any law has h(r') = (1 + gamma xi', eta'). Rolling then asks for
+    sigma xi = -R omega eta' and sigma eta = R (sigma vartheta + gamma omega xi'), and the equation of motion is
+    M sigma^2 vartheta + rho gamma R^2 omega sigma xi' = beta vartheta'' - K R d^4 eta/ds^4.
+    Field law: sigma -> omega sqrt(beta/K) as q -> infinity, unbounded in q if K = 0. Unit law: zero.
     """
-    checks.choice("rolling", rolling, ROLLING)
+    gamma = stretching(ROLLING[checks.choice("rolling", rolling, ROLLING)])
     t, c = symbols(q, k)
-    if rolling == "unit":
-        return np.zeros_like(t)
-    r2, push = rod.radius**2, (omega * c) ** 2
+    r2, push = rod.radius**2, gamma * (omega * c) ** 2
     b = rod.torsion_stiffness * t + rod.bending_stiffness * r2 * t**2 - rod.spin_inertia * r2 * push
     last = rod.torsion_stiffness * r2 * push * t
-    root = np.sqrt(b**2 + 4 * rod.inertia * last)
-    # both forms of the positive root of M u^2 + b u - last, each where it does not cancel
+    root = np.emath.sqrt(b**2 + 4 * rod.inertia * last)
+    # both forms of the larger root of M u^2 + b u - last, each where it does not cancel
     with np.errstate(divide="ignore", invalid="ignore"):
         square = np.where(b > 0, 2 * last / (root + b), (root - b) / (2 * rod.inertia))
-    return np.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square))
+    growing: NDArray = np.emath.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square)).real
+    return growing
 
 
 def steered_frequencies(rod: SteeredRod, q: ArrayLike, k: float | None = None) -> NDArray:

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from continuum.dispersion import frequency, growth, symbols
 from continuum.rod import Rod
 from discs import checks
-from discs.chains.chain import ROLLING
+from discs.chains.rolling import ROLLING, stretching
 
 
 class Ring(NamedTuple):
@@ -32,13 +32,13 @@ def _collapse(a0: float, inward: float, nu: float) -> float:
 def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | None = None) -> Ring:
     r"""The circle of circumference `rod.length` whose discs all roll at the rate `omega` at t = 0.
 
-    With a_0 = length/2 pi, headings |r'| = g a/a_0 and curvature |r''| = b a, where g = 1 and b = 1/a_0^2 for the field,
-    and for n discs of spacing k g = (a_0/k) sin(2 pi/n), b = (4/k^2) sin^2(pi/n), M(a) = alpha + rho R^2 (g a/a_0)^2:
+    With a_0 = length/2 pi, slopes z = |r'| = g a/a_0 and curvature |r''| = b a, where g = 1 and b = 1/a_0^2 for the field,
+    and for n discs of spacing k g = (a_0/k) sin(2 pi/n), b = (4/k^2) sin^2(pi/n), a law of rolling h(z) moves the ring by
+    a. = -R omega |h| and keeps M omega^2/2 + K b^2 a^2/2, M = alpha + rho R^2 |h|^2, so
 
-    field law: a. = -R omega g a/a_0, hence a = a_0 exp(-R g theta/a_0) and M omega^2/2 + K b^2 a^2/2 = const, that is
-        M omega. = (R g/a_0)(rho R^2 g^2 omega^2 / a_0^2 + K b^2) a^2;
-        one ordinary differential equation, integrated to 1e-13.
-    unit law: a. = -R omega and (alpha + rho R^2) a.. = -K R^2 b^2 a, harmonic. It ends in a point, where a = 0.
+        M omega. = R |h| (rho R^2 |h| |h|' omega^2 g/a_0 + K b^2 a),   |h|' = d|h|/dz,
+
+    integrated to 1e-13. Unit law, |h| = 1: (alpha + rho R^2) a.. = -K R^2 b^2 a, harmonic. Where a = 0 the ring ends as a point.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
 
     Raises
     ------
-    ValueError : for an unknown law, or times after the unit law's ring has become a point.
+    ValueError : for an unknown law, or times after the ring has become a point.
     """
-    checks.choice("rolling", rolling, ROLLING)
+    law = ROLLING[checks.choice("rolling", rolling, ROLLING)]
     t = np.atleast_1d(np.asarray(t, dtype=float))
     if not t.size or not np.isfinite(t).all() or t[0] < 0 or (np.diff(t) <= 0).any():
         raise ValueError(f"t must be increasing times from 0 on; got {t}")
@@ -61,7 +61,7 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     g = 1.0 if n is None else a0 / k * np.sin(2 * np.pi / n)
     b = 1 / a0**2 if n is None else (2 / k * np.sin(np.pi / n)) ** 2
     r, stiffness = rod.radius, rod.bending_stiffness * b**2
-    if rolling == "unit":
+    if rolling == "unit":  # in closed form
         pull = r * stiffness / rod.inertia
         nu = np.sqrt(r * pull)
         end = _collapse(a0, r * omega, nu)
@@ -74,16 +74,22 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
         theta = a0 * pull * t**2 / 2 * np.sinc(nu * t / (2 * np.pi)) ** 2 + omega * sine
         return Ring(a, theta, a0 * pull * sine + omega * np.cos(nu * t))
 
-    def rate(_: float, z: NDArray) -> list[float]:
-        stretch = np.exp(-2 * r * g * z[0] / a0)
-        inertia = rod.spin_inertia + rod.density * r**2 * g**2 * stretch
-        force = r * g * a0 * stretch * (rod.density * r**2 * g**2 * z[1] ** 2 / a0**2 + stiffness)
-        return [z[1], force / inertia]
+    def rate(_: float, state: NDArray) -> list[float]:
+        a, _, omega = state
+        z, along = np.array([g * a / a0, 0.0]), np.array([1.0, 0.0])
+        h, slope = float(law.size(z[0])), float(law.rate(z, along)[0])
+        inertia = rod.spin_inertia + rod.density * r**2 * h**2
+        return [-r * h * omega, omega, r * h * (rod.density * r**2 * h * slope * omega**2 * g / a0 + stiffness * a) / inertia]
 
+    def point(_: float, state: NDArray) -> float:
+        return float(state[0])
+
+    point.terminal = True  # type: ignore[attr-defined]
     span = 0.0, max(float(t[-1]), 1e-300)
-    solution = solve_ivp(rate, span, [0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14)
-    theta, rate_of_roll = solution.y
-    return Ring(a0 * np.exp(-r * g * theta / a0), theta, rate_of_roll)
+    found = solve_ivp(rate, span, [a0, 0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14, events=point)
+    if found.t_events[0].size:
+        raise ValueError(f"the ring is a point at t = {found.t_events[0][0]:g}; ask for earlier times")
+    return Ring(*found.y)
 
 
 class Motion(NamedTuple):
@@ -153,15 +159,19 @@ def standing_wave(
     return Motion(s + 0 * t, rod.radius * theta * np.cos(omega * t), theta * np.cos(omega * t), -omega * theta * np.sin(omega * t))
 
 
-def growing_wave(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float, mode: int, amplitude: float, n: int | None = None) -> Motion:
-    r"""The growing wave of the straight rod that rolls sideways at the rate omega, field law, to first order in the amplitude.
+def growing_wave(
+    rod: Rod, s: ArrayLike, t: ArrayLike, omega: float, mode: int, amplitude: float, n: int | None = None, rolling: str = "field"
+) -> Motion:
+    r"""The growing wave of the straight rod that rolls sideways at the rate omega, to first order in the amplitude.
 
-    Perturb `rolling_line` by (xi, eta, vartheta) e^{sigma t}. Rolling, r. = R theta. J r', asks for sigma xi = -R omega eta' and
-    sigma eta = R (sigma vartheta + omega xi'), hence with sigma of `dispersion.growth`, q = 2 pi mode/length and g = R omega q
+    Perturb `rolling_line` by (xi, eta, vartheta) e^{sigma t}. Rolling asks for sigma xi = -R omega eta' and
+    sigma eta = R (sigma vartheta + gamma omega xi'), hence with sigma and gamma of `dispersion.growth`, q = 2 pi mode/length and
+    g = R omega q
 
-        vartheta = a cos(q s),   eta = b cos(q s),   xi = (g/sigma) b sin(q s),   b = R sigma^2/(sigma^2 - g^2) a.
+        vartheta = a cos(q s),   eta = b cos(q s),   xi = (g/sigma) b sin(q s),   b = R sigma^2/(sigma^2 - gamma g^2) a.
 
-    (sigma < g: the dispersion relation is positive at sigma = g.) For n discs on a ring q -> sin(q k)/k in g.
+    (Field law, gamma = 1: sigma < g, as the dispersion relation is positive at sigma = g.) For n discs on a ring
+    q -> sin(q k)/k in g.
 
     Parameters
     ----------
@@ -169,19 +179,23 @@ def growing_wave(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float, mode: int, 
     omega : not zero; without rolling nothing grows.
     mode : waves around the closed rod, 1, 2, ...
     n : number of discs, None for the field.
+    rolling : a law with gamma >= 0; others may grow by waves that also travel.
 
     Raises
     ------
-    ValueError : for a rod that this wave does not grow on.
+    ValueError : for a rod that this wave does not grow on, and for a law with gamma < 0.
     """
+    gamma = stretching(ROLLING[checks.choice("rolling", rolling, ROLLING)])
+    if gamma < 0:
+        raise ValueError(f"growing_wave is for laws with gamma >= 0; rolling={rolling!r} has {gamma:g}")
     s, t, omega = *_axes(s, t), checks.number("omega", omega)
     q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
     k = None if n is None else rod.length / checks.whole("n (discs of a ring)", n, 5)
-    sigma, g = float(growth(rod, q, omega, k=k)), rod.radius * omega * float(symbols(q, k).first)
+    sigma, g = float(growth(rod, q, omega, rolling, k)), rod.radius * omega * float(symbols(q, k).first)
     if not sigma:
         raise ValueError(f"wave {mode} does not grow at omega = {omega:g}; see standing_wave")
     a = checks.number("amplitude", amplitude) * np.exp(sigma * t)
-    b, wave = rod.radius * sigma**2 / (sigma**2 - g**2) * a, np.cos(q * s)
+    b, wave = rod.radius * sigma**2 / (sigma**2 - gamma * g**2) * a, np.cos(q * s)
     line = rolling_line(rod, s[0], t[:, 0], omega)
     return Motion(line.x + g / sigma * b * np.sin(q * s), line.y + b * wave, line.theta + a * wave, line.omega + sigma * a * wave)
 

@@ -17,6 +17,7 @@ from continuum.mesh import semidiscretise
 from continuum.rod import Rod, Scene
 from continuum.scenes import rolling_rod, untwisting_rod
 from discs import Midpoint, Suzuki4, simulate
+from discs.chains.rolling import ROLLING, stretching
 from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, SIGNED, UNSIGNED
 
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
@@ -28,15 +29,15 @@ def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, du
     It starts from all waves at once, small enough to pass through each other: growing ones under the field law, standing ones
     under the unit law. A wave's size is that of its amplitude and rate, sqrt(|theta_m|^2 + |omega_m|^2/rate^2).
     """
-    waves = range(1, modes + 1)
+    waves, grows = range(1, modes + 1), bool(stretching(ROLLING[rolling]))
 
     def initial(s: NDArray) -> tuple[NDArray, ...]:
         line = exact.rolling_line(rod, s, 0.0, omega)
         start = np.array(line)[:, 0]
         for mode in waves:
             size = 1e-9 / mode  # slopes are alike
-            if rolling == "field":
-                wave = np.array(exact.growing_wave(rod, s, 0.0, omega, mode, size, n)) - line
+            if grows:
+                wave = np.array(exact.growing_wave(rod, s, 0.0, omega, mode, size, n, rolling)) - line
             else:
                 wave = np.array(exact.standing_wave(rod, s, 0.0, mode, size, closed=True, n=n)) - exact.rolling_line(
                     rod, s, 0.0, 0.0
@@ -47,7 +48,7 @@ def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, du
     scene = replace(rolling_rod(rolling, duration=duration), rod=rod, initial=initial, shift=(rod.length, 0.0))
     run = simulate(semidiscretise(scene, n, "ring"), FINE, duration / 200, frames=2, progress=False)
     theta, rate = (np.abs(np.fft.rfft(values, axis=1)[:, 1 : modes + 1]) for values in (run.theta, run.omega))
-    if rolling == "field":
+    if grows:
         return np.log(theta[1] / theta[0]) / duration
     own = frequency(rod, 2 * np.pi * np.arange(1, modes + 1) / rod.length, rod.length / n)
     size = np.hypot(theta, rate / own)

@@ -36,8 +36,8 @@ from scipy.linalg import LinAlgError, solve_banded
 
 from discs import Chain
 from discs.chains import stencils
+from discs.chains.links.linear import LinearCurvature
 from discs.chains.rolling_discs import folded
-from discs.chains.springs import LinearCurvature
 
 MOST_SWEEPS = 30
 

@@ -1,6 +1,6 @@
 r"""The rod whose sections roll along the centre line, by Galerkin's method with polynomials, or Fourier series on a closed rod.
 
-Admissible velocities and variations are (e psi, psi). With r = x + i y, z = r' and e = i R z (field law) or i R z/|z| (unit law),
+Admissible velocities and variations are (e psi, psi). With r = x + i y, z = r' and e = i R h(z), h a law of `discs.chains.rolling`,
 d'Alembert's principle reads, for every psi,
 
     int (alpha + rho |e|^2) omega. psi + rho omega Re(conj(e) e.) psi = - int K Re(conj(r'') (e psi)'') + beta theta' psi'.
@@ -38,6 +38,7 @@ from continuum.bases import polynomials, waves
 from continuum.density import Density
 from continuum.initial import Resolved, resolve
 from continuum.rod import Scene
+from discs.chains.rolling import ROLLING
 from discs.skew import Phase, SkewGradient
 
 DATA = 24  # points of a piece of the initial fields, besides those for the functions
@@ -67,7 +68,8 @@ class SpectralRod(SkewGradient):
 
     Attributes
     ----------
-    unit, closed : whether rolling is by the unit law, and whether the rod is closed.
+    law : of rolling.
+    closed : whether the rod is.
     twist : (n,), the moment f of the initial twist.
     crossing : the time that a wave of the rod's length takes along it, over 2 pi.
     start : the initial state.
@@ -79,7 +81,7 @@ class SpectralRod(SkewGradient):
     def __init__(self, scene: Scene, n: int, density: Density | None = None) -> None:
         rod = scene.rod
         self.closed = scene.closed
-        self.n, self.unit, self._radius, self._scene = n, scene.rolling == "unit", rod.radius, scene
+        self.n, self.law, self._radius, self._scene = n, ROLLING[scene.rolling], rod.radius, scene
         self.basis = (waves if scene.closed else polynomials)(n, density or Density(rod.length))
         self.scale = np.array([rod.length, rod.length, 1.0])
         self.bending, self.torsion = rod.bending_stiffness * self.basis.bending, rod.torsion_stiffness * self.basis.torsion
@@ -112,7 +114,7 @@ class SpectralRod(SkewGradient):
             scale=self.scale,
             shift=self._shift,
             radius=float(self._radius),
-            unit=self.unit,
+            rolling=self.law.parameters,
         )
 
     @cached_property
@@ -147,8 +149,8 @@ class SpectralRod(SkewGradient):
 
     def _omega(self, z: Phase) -> NDArray:
         """omega at the nodes, (..., n); as `frame` has it, without the finer points."""
-        arm = self._radius if self.unit else self._radius * np.abs(self.slopes(z))
-        return z.pi / np.sqrt(self._spin + self._mass * arm**2)
+        e = self._radius * self.law.size(np.abs(self.slopes(z)))
+        return z.pi / np.sqrt(self._spin + self._mass * e**2)
 
     def energy(self, z: Phase) -> float:
         """Kinetic and potential energy."""
@@ -192,14 +194,9 @@ class SpectralRod(SkewGradient):
         z = xy[..., 0, :] + 1j * xy[..., 1, :]
         n, f = self.n, self.basis.project.shape[1] - self.n
         at, slope, bend, bent = z[..., :n] + self._shift, z[..., n : n + f] + self._shift, z[..., n + f : -f], z[..., -f:]
-        if self.unit:  # z/|z| = exp(i phi) with phi' = Im(z'/z)
-            e, finer = at / np.abs(at), slope / np.abs(slope)
-            log = bend / slope
-            rate, turning = 1j * log.imag, 1j * (bent / slope - log * log).imag
-            fine = np.stack([(turning + rate * rate) * finer, 2 * rate * finer, finer], axis=-2)
-        else:
-            e, fine = at, np.stack([bent, 2 * bend, slope], axis=-2)
-        e = 1j * self._radius * e
+        e = 1j * self._radius * self.law.jet(at, 0 * at, 0 * at)[0]
+        h, h1, h2 = self.law.jet(slope, bend, bent)
+        fine = np.stack([h2, 2 * h1, h], axis=-2)
         t = 1 / np.sqrt(self._spin + self._mass * (e.real**2 + e.imag**2))
         return Frame(e, t, 1j * self._radius * fine)
 

@@ -30,6 +30,8 @@ from numpy.typing import NDArray
 
 from continuum.pieces import ENDS, NODES, POINTS, TINY, WEIGHTS, Cut, Data, split
 from continuum.rod import Scene, SteeredRod
+from discs.chains.links import CURVATURE
+from discs.chains.rolling import ROLLING
 
 SHARP = 1e-6  # pieces shorter than this, of the length, may not hold more than a thousandth of the energy
 STILL = 1e-6  # slopes below this, of the largest, are none
@@ -138,7 +140,7 @@ def _check_jumps(data: Data, cut: Cut) -> None:
     if not scene.steered:
         if scene.rod.bending_stiffness:
             _check_corners(data, cut)
-        if scene.rolling == "unit" or scene.rod.curvature == "true":
+        if ROLLING[scene.rolling].vanishing or CURVATURE[scene.rod.curvature].directed:
             _check_heading(data, cut)
 
 
@@ -191,7 +193,8 @@ def _check_heading(data: Data, cut: Cut) -> None:
     least = np.abs(now + part * move).min(axis=1)
     p = int(np.argmin(least))
     if least[p] <= STILL * np.abs(z).max():
-        law = "rolling='unit'" if data.scene.rolling == "unit" else "curvature='true'"
+        rolls = ROLLING[data.scene.rolling].vanishing
+        law = f"rolling={data.scene.rolling!r}" if rolls else f"curvature={data.scene.rod.curvature!r}"
         raise ValueError(
             f"{law} needs a heading: r' = 0 between s = {cut.edges[p]:g} and {cut.edges[p + 1]:g}; take a line that moves on with s"
         )
@@ -214,13 +217,9 @@ def _energies(data: Data, cut: Cut) -> NDArray:
         density = rod.stretch_stiffness * strain.real**2 + rod.shear_stiffness * strain.imag**2
         density += rod.bending_stiffness * slope["phi"] ** 2
     else:
-        stretched = 1.0 if scene.rolling == "unit" else np.abs(z) ** 2
-        kinetic = (rod.spin_inertia + rod.density * rod.radius**2 * stretched) * value["omega"] ** 2
-        if rod.curvature == "linear":
-            density = rod.bending_stiffness * np.abs(z1) ** 2
-        else:
-            turning = (z.conj() * z1).imag / np.abs(z) ** 2 if rod.bending_stiffness else 0.0
-            density = rod.bending_stiffness * turning**2 + rod.stretch_stiffness * (np.abs(z) - 1) ** 2
+        e = rod.radius * ROLLING[scene.rolling].size(np.abs(z))
+        kinetic = (rod.spin_inertia + rod.density * e**2) * value["omega"] ** 2
+        density = CURVATURE[rod.curvature].density(rod.bending_stiffness, rod.stretch_stiffness, z, z1)
     density += rod.torsion_stiffness * slope["theta"] ** 2
     energies: NDArray = cut.width / 4 * (np.stack([kinetic, density]) @ WEIGHTS)
     return energies

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
-from discs.chains.chain import CURVATURE, ROLLING
+from discs.chains import links
+from discs.chains.rolling import ROLLING
 
 Fields = Callable[[NDArray], tuple[NDArray, ...]]
 
@@ -51,9 +52,7 @@ class Rod:
         self._check_law()
 
     def _check_law(self) -> None:
-        checks.choice("curvature", self.curvature, CURVATURE)
-        if self.curvature == "linear" and self.stretch_stiffness:
-            raise ValueError("stretch_stiffness goes with curvature='true'; with 'linear' it must be 0")
+        links.find(self.curvature, self.stretch_stiffness)
 
     @property
     def inertia(self) -> float:

@@ -159,7 +159,7 @@ class Steps:
 
     def _turned(self, slopes: NDArray, after: Phase) -> bool:
         """Whether a heading may have been lost within a step, from slopes (n,) before it."""
-        if not self.rod.unit:
+        if not self.rod.law.vanishing:
             return False
         part = _nearest(slopes)
         now, then = (z[:-1] + part * np.diff(z) for z in (slopes, self._slopes(after)))
@@ -180,8 +180,8 @@ class Steps:
     def _check_heading(self, slopes: NDArray, t: float) -> None:
         least = np.abs(slopes[:-1] + _nearest(slopes) * np.diff(slopes))
         node = int(np.argmin(least))
-        if self.rod.unit and not least[node] > LOST_HEADING:
-            message = "the rod lost its heading: r' = 0, and rolling='unit' has no direction there"
+        if self.rod.law.vanishing and not least[node] > LOST_HEADING:
+            message = f"the rod lost its heading: r' = 0, and rolling={self.rod.law.name!r} has no direction there"
             raise SimulationError(message, len(self.lengths), t, node)
 
     def _check_number(self, t: float) -> None:

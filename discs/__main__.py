@@ -4,6 +4,7 @@ import argparse
 import sys
 
 from discs import command_line
+from discs.chains.rolling import ROLLING
 from discs.chains.twist import DURATION, PAPER, STEERED, TURNS, untwisting_chain
 
 UNITS = {
@@ -33,7 +34,7 @@ def parser() -> argparse.ArgumentParser:
         "after Ctrl-C or a crash the same command goes on where it was.",
     )
     run.add_argument("--t", metavar="T", type=float, default=DURATION, help=f"duration, time (default: {DURATION})")
-    run.add_argument("--rolling", choices=("field", "unit", "own"), default="field", help="law; own: own headings (default: field)")
+    run.add_argument("--rolling", choices=(*ROLLING, "own"), default="field", help="law; own: own headings (default: field)")
     run.add_argument("--twist", metavar="TURNS", type=float, default=TURNS, help=f"turns between the ends (default: {TURNS})")
     command_line.add_run_options(run)
     rod = run.add_argument_group("the rod")

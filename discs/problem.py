@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
 from discs.chains.chain import Chain, SteeredChain
+from discs.chains.rolling import stretching
 from discs.chains.rolling_discs import RollingDiscs
 from discs.chains.slaved import SlavedSystem
 from discs.chains.steered import SteeredSystem
@@ -87,7 +88,8 @@ class Problem:
     def _check_loads(self) -> None:
         if not isinstance(self.loads, tuple) or not all(isinstance(load, Load) for load in self.loads):
             raise ValueError(f"loads must be a tuple of loads, as (Linear(...),); got {self.loads!r}")
-        shape = (3 if isinstance(self.chain, Chain) else 4), self.chain.n
+        system = SlavedSystem if isinstance(self.chain, Chain) else SteeredSystem
+        shape = len(system.rows), self.chain.n
         for load in self.loads:
             if np.shape(load.damping) != shape or np.shape(load.stiffness) != shape:
                 raise ValueError(
@@ -98,12 +100,12 @@ class Problem:
     def _check_slopes(self, chain: Chain) -> None:
         shape = self.system.shape(self._positions())
         slope = np.hypot(*self.system.slope(shape))
-        if chain.rolling == "unit" and not slope.all():
+        if chain.rolling_law.vanishing and not slope.all():
             i = int(np.argmin(slope))
-            raise ValueError(f"rolling='unit' needs a heading: r' = 0 at disc {i}; move its neighbours apart")
-        if chain.curvature == "true" and not np.hypot(shape[0], shape[1]).all():
+            raise ValueError(f"rolling={chain.rolling!r} needs a heading: r' = 0 at disc {i}; move its neighbours apart")
+        if chain.link_law.directed and not np.hypot(shape[0], shape[1]).all():
             i = int(np.argmin(np.hypot(shape[0], shape[1])))
-            raise ValueError(f"curvature='true' needs links with a direction: discs {i} and {i + 1} are in one place")
+            raise ValueError(f"curvature={chain.curvature!r} needs links with a direction: discs {i} and {i + 1} are in one place")
         self._check_inertia((slope > 0) & (np.asarray(chain.radius) > 0), "r' = 0 or radius = 0")
 
     def _check_inertia(self, moves: NDArray, where: str) -> None:
@@ -145,22 +147,24 @@ class Problem:
 
     @cached_property
     def ill_posed(self) -> str:
-        """What to warn of where discs without bending stiffness roll, or will, under the field law; empty where all is well.
+        """What to warn of where discs without bending stiffness roll, or will, by a law that feels stretch; empty if none.
 
         With K = 0 the straight rod rolling at the rate omega amplifies waves of length 2 pi/q at the rate sigma = u q, where
-        M u^4 + (beta - alpha R^2 omega^2) u^2 = beta R^2 omega^2 (docs/model.md): a Hadamard instability. Discs of spacing k cut it
+        M u^4 + (beta - gamma alpha R^2 omega^2) u^2 = gamma beta R^2 omega^2 with gamma = `stretching(law)`, 1 under the field law
+        (docs/model.md, `continuum.dispersion`): a Hadamard instability. Discs of spacing k cut it
         off at sigma <= R omega/k, so runs with more discs do not converge to anything.
         """
         chain = self.chain
-        limp = isinstance(chain, Chain) and chain.rolling == "field" and not np.any(chain.bending_stiffness)
-        if not limp or not np.any(chain.radius) or self.energy() <= 0:  # what has no energy never moves
+        if not isinstance(chain, Chain) or np.any(chain.bending_stiffness) or not stretching(chain.rolling_law):
+            return ""
+        if not np.any(chain.radius) or self.energy() <= 0:  # what has no energy never moves
             return ""
         rate = np.max(np.asarray(chain.radius) * np.abs(self.initial.omega)) / chain.k
         now = f", at the start up to {rate:.3g} per unit of time" if rate > 0 else ""
         return (
-            "bending_stiffness is 0 under rolling='field': the equations of a rolling rod are ill posed, short waves grow at rates "
-            f"proportional to the number of discs{now}, and there is no limit of many discs; take bending_stiffness > 0 or "
-            "rolling='unit'"
+            f"bending_stiffness is 0 under rolling={chain.rolling!r}: the equations of a rolling rod are ill posed, short waves "
+            f"grow at rates proportional to the number of discs{now}, and there is no limit of many discs; take "
+            "bending_stiffness > 0 or rolling='unit'"
         )
 
     def energy(self, state: State | None = None) -> float:

@@ -2,7 +2,9 @@
 
 from continuum.scenes import untwisting_rod
 from continuum.solver import solve
+from discs.chains.rolling import ROLLING
 
 if __name__ == "__main__":
-    solve(untwisting_rod(duration=0.1), 1e-3, progress=False)
-    print("rolling rod as a field: gauss8 compiled", flush=True)
+    for law in ROLLING:
+        solve(untwisting_rod(law, duration=0.1), 1e-3, progress=False)
+        print(f"rolling rod as a field, {law} law: gauss8 compiled", flush=True)

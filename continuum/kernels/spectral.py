@@ -3,11 +3,12 @@
 Arrays have a row for each stage, `s` of them, F finer points.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discs.kernels import protocol as do
 from discs.kernels.compiled import part as _part
 
 
@@ -36,7 +37,7 @@ class Spectral(NamedTuple):
     scale: NDArray
     shift: complex
     radius: float
-    unit: bool
+    rolling: Any
 
 
 class Frame(NamedTuple):
@@ -84,24 +85,18 @@ def frame(rod, work, q, c):
     for i in range(s):
         x, y = work.line[2 * i], work.line[2 * i + 1]
         for k in range(n):
-            e = complex(x[k], y[k]) + rod.shift
-            length = np.sqrt(e.real * e.real + e.imag * e.imag)
-            e *= 1j * (rod.radius / length if rod.unit else rod.radius)
+            slope = complex(x[k], y[k]) + rod.shift
+            a, b, factor, _ = do.contact(rod.rolling, rod.radius, 1.0, slope.real, slope.imag)
+            e = complex(a, b) * (1j * factor)
             c.e[i, k] = e
             c.t[i, k] = 1 / np.sqrt(rod.spin[k] + rod.mass[k] * (e.real * e.real + e.imag * e.imag))
         for f in range(points):
             at, first, second = n + f, n + points + f, n + 2 * points + f
             slope = complex(x[at], y[at]) + rod.shift
             bend, bent = complex(x[first], y[first]), complex(x[second], y[second])
-            if rod.unit:  # z/|z| = exp(i phi) with phi' = Im(z'/z)
-                square = slope.real * slope.real + slope.imag * slope.imag
-                inverse = slope.conjugate() * (1 / square)
-                log = bend * inverse
-                rate, turning = log.imag, (bent * inverse - log * log).imag
-                slope *= 1 / np.sqrt(square)
-                bend, bent = 1j * rate * slope, complex(-rate * rate, turning) * slope
+            h, h1, h2 = do.jet(rod.rolling, slope, bend, bent)
             ir = 1j * rod.radius
-            c.finer[i, 0, f], c.finer[i, 1, f], c.finer[i, 2, f] = ir * bent, 2 * ir * bend, ir * slope
+            c.finer[i, 0, f], c.finer[i, 1, f], c.finer[i, 2, f] = ir * h2, 2 * ir * h1, ir * h
 
 
 @part

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from discs import checks
-from discs.chains import stencils
+from discs.chains import links, stencils
+from discs.chains.rolling import ROLLING, RollingLaw
 
-ROLLING = ("field", "unit")
-CURVATURE = ("linear", "true")
 SHORTEST = 1e-60  # spacing whose fourth power, with stiffness and inertia, is a double by far
 FEWEST = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}
 WHY = {
@@ -53,8 +52,8 @@ class Chain(Spaced):
         V = sum_links beta/(2k) (theta_{i+1} - theta_i)**2 + sum_bends K k/2 |r''_i|**2,
 
     and disc i moves by r_i' = e_i omega_i, with e_i = R J r'_i ("field", the paper's (constraints)) or
-    e_i = R J r'_i/|r'_i| ("unit", (constraintsphi)); J turns by +90 degrees. The stencils of r' and r'' are in
-    `discs.chains.stencils`.
+    e_i = R J r'_i/|r'_i| ("unit", (constraintsphi)); J turns by +90 degrees. The laws are in `discs.chains.rolling` and
+    `discs.chains.links`, the stencils of r' and r'' in `discs.chains.stencils`.
 
     Parameters
     ----------
@@ -95,21 +94,30 @@ class Chain(Spaced):
     def __post_init__(self) -> None:
         checks.choice("ends", self.ends, stencils.ENDS)
         checks.choice("rolling", self.rolling, ROLLING)
-        checks.choice("curvature", self.curvature, CURVATURE)
+        checks.choice("curvature", self.curvature, links.CURVATURE)
         n = checks.whole(f"n (discs, ends={self.ends!r})", self.n, FEWEST[self.ends], WHY[self.ends])
         object.__setattr__(self, "n", n)
-        links = n - (self.ends != "ring")
+        joints = n - (self.ends != "ring")
         _settle(
             self,
             density=(n, True),
             spin_inertia=(n, False),
-            torsion_stiffness=(links, False),
+            torsion_stiffness=(joints, False),
             bending_stiffness=(stencils.bend_shares(n, 1.0, self._bend_ends).size, False),
-            stretch_stiffness=(links, False),
+            stretch_stiffness=(joints, False),
             radius=(n, False),
         )
-        if self.curvature == "linear" and np.any(self.stretch_stiffness):
-            raise ValueError("stretch_stiffness goes with curvature='true'; with 'linear' it must be 0")
+        links.find(self.curvature, np.any(self.stretch_stiffness))
+
+    @property
+    def rolling_law(self) -> RollingLaw:
+        """The law of rolling that `rolling` names."""
+        return ROLLING[self.rolling]
+
+    @property
+    def link_law(self) -> type[links.LinkLaw]:
+        """The link law that `curvature` names."""
+        return links.CURVATURE[self.curvature]
 
     @property
     def bend_shares(self) -> NDArray:
@@ -118,7 +126,7 @@ class Chain(Spaced):
 
     @property
     def _bend_ends(self) -> str:
-        return "springs" if self.curvature == "true" and self.ends == "consistent" else self.ends
+        return "springs" if self.ends == "consistent" and not self.link_law.end_bends else self.ends
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from discs.chains import stencils
 from discs.chains.chain import Chain
 from discs.chains.rolling_discs import RollingDiscs, folded
-from discs.chains.springs import LinearCurvature, TrueCurvature
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Load, Placed
 
 
 class SlavedSystem(RollingDiscs):
-    """The equations of motion of a `Chain`; a shape is its links, (3, n_links). The springs are those of `discs.chains.springs`."""
+    """The equations of motion of a `Chain`; a shape is its links, (3, n_links). The springs are those of
+    `discs.chains.links`, and e is that of a law in `discs.chains.rolling`."""
 
     rows = ("x", "y", "theta")
 
@@ -38,10 +38,10 @@ class SlavedSystem(RollingDiscs):
         self.load = load
         self.closed, self.reach = ends == "ring", 3 if ends == "consistent" else 2
         self.scale = np.array([chain.length, chain.length, 1.0])
-        self._springs: Any = LinearCurvature(chain) if chain.curvature == "linear" else TrueCurvature(chain)
+        self._law, self._springs = chain.rolling_law, chain.link_law(chain)
         self.quadratic = self._springs.quadratic
         self._shift = np.array([*chain.shift, 0.0])
-        self._unit = self.vanishing = chain.rolling == "unit"
+        self.vanishing = self._law.vanishing
         self._radius = np.asarray(chain.radius)
         mass = chain.w * np.asarray(chain.density)
         self.weights = np.array([mass, mass, chain.w * np.asarray(chain.spin_inertia)])
@@ -67,16 +67,12 @@ class SlavedSystem(RollingDiscs):
 
     def contact(self, shape: NDArray) -> NDArray:
         slope = self.slope(shape)
-        e = slope[::-1] * (self._radius / np.hypot(*slope) if self._unit else self._radius)
+        e = slope[::-1] * self._law.arm(self._radius, slope)
         np.negative(e[0], out=e[0])
         return e
 
     def contact_rate(self, shape: NDArray, v: NDArray) -> NDArray:
-        turning = self.slope(stencils.links(v, self._ends))
-        if self._unit:  # of r'/|r'|: the part of the rate across r', over |r'|
-            slope = self.slope(shape)
-            square = (slope * slope).sum(axis=0)
-            turning = (turning - slope * ((slope * turning).sum(axis=0) / square)) / np.sqrt(square)
+        turning = self._law.rate(self.slope(shape), self.slope(stencils.links(v, self._ends)))
         return self._radius * np.array([-turning[1], turning[0]])
 
     def inertia(self, e: NDArray) -> NDArray:
@@ -100,7 +96,7 @@ class SlavedSystem(RollingDiscs):
         return np.sqrt(self.inertia(self.contact(shape))) * rates[0]
 
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
-        """Under the unit law: a disc whose r', on the straight way between two configurations, comes below `LOST_HEADING`."""
+        """Where headings can vanish: a disc whose r' comes below `LOST_HEADING` on the straight way between two configurations."""
         if not self.vanishing:
             return None
         a, b = (self.slope(self.shape(z.hi, z.lo)) for z in (before, after))
@@ -116,8 +112,6 @@ class SlavedSystem(RollingDiscs):
         return self._springs.potential(shape)
 
     def polarised(self, shape: NDArray, other: NDArray) -> float:
-        if not self.quadratic:
-            raise ValueError("V is not quadratic with curvature='true'")
         return self._springs.polarised(shape, other)
 
     def secant(self, shape: NDArray, dq: NDArray) -> Any:
@@ -137,9 +131,9 @@ class SlavedSystem(RollingDiscs):
 
     @cached_property
     def kernel(self) -> Any:
-        if not self.quadratic or (self.load is not None and self.load.parameters is None):
+        parts = [part.parameters for part in (self._law, self._springs, self.load) if part is not None]
+        if None in parts:
             return None
         from discs.kernels import slaved  # numba is slow to import
 
-        load = None if self.load is None else self.load.parameters
-        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, self._springs, load)
+        return slaved.parameters(self._chain, self.weights, self.scale, self._shift, *parts)

@@ -206,5 +206,5 @@ class SteeredSystem(RollingDiscs):
             return None
         from discs.kernels import steered  # numba is slow to import
 
-        load = None if self.load is None else self.load.parameters
-        return steered.parameters(self._chain, self.weights, self._roots, self.scale, self._shift, self._stiffness, load)
+        load = () if self.load is None else (self.load.parameters,)
+        return steered.parameters(self._chain, self.weights, self._roots, self.scale, self._shift, self._stiffness, *load)

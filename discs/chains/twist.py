@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.chains.chain import Chain, SteeredChain
+from discs.chains.rolling import ROLLING
 from discs.problem import Problem, State
 
 PAPER = {
@@ -35,7 +36,7 @@ def untwisting_chain(
     Parameters
     ----------
     n : number of discs.
-    rolling : "field", "unit", or "own" for discs with a heading of their own.
+    rolling : a name in `discs.chains.rolling`, "field" or "unit", or "own" for discs with a heading of their own.
     ends : of a `Chain`; "springs" for own headings.
     duration : time.
     twist : turns between the two ends.
@@ -45,7 +46,7 @@ def untwisting_chain(
     ------
     ValueError : for an unknown parameter or one out of its range.
     """
-    own = checks.choice("rolling", rolling, ("field", "unit", "own")) == "own"
+    own = checks.choice("rolling", rolling, (*ROLLING, "own")) == "own"
     standard = PAPER | STEERED if own else PAPER
     for name in parameters:
         checks.choice("parameter of the chain" + (" (own headings)" if own else ""), name, standard)

@@ -5,6 +5,7 @@ import sys
 from typing import Any
 
 from discs.chains.chain import Chain, SteeredChain
+from discs.chains.rolling import ROLLING
 from discs.integrators import METHODS
 from discs.problem import Problem, State
 from discs.simulation import simulate
@@ -15,19 +16,20 @@ OF = {"midpoint": "compositions", "gauss6": "Gauss methods"}  # kernels that sev
 
 
 def compile_for(law: str) -> None:
-    """Compile every kernel for a kind of chain, "slaved" or "own" headings."""
+    """Compile every kernel for a kind of chain, of slaved headings by a law of rolling or of "own" ones."""
     own = law == "own"
     values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + OWN if own else ONES, 1.0)
-    chain: Chain | SteeredChain = SteeredChain(**values) if own else Chain(**values)
+    chain: Chain | SteeredChain = SteeredChain(**values) if own else Chain(**values, rolling=law)
+    words = "discs with own headings" if own else f"discs with slaved headings, {law} law"
     problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if own else None), 0.01)  # at rest
     for name in ("midpoint", "gauss6", "rk4", "leapfrog", "mclachlan-perlmutter", "RK45"):
         simulate(problem, METHODS[name](), 0.005, frames=1, progress=False)
-        print(f"discs with {law} headings: {OF.get(name, name)} compiled", flush=True)
+        print(f"{words}: {OF.get(name, name)} compiled", flush=True)
 
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         compile_for(sys.argv[1])
     else:  # side by side: a processor each
-        both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", law]) for law in ("slaved", "own")]
+        both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", law]) for law in (*ROLLING, "own")]
         sys.exit(max(process.wait() for process in both))

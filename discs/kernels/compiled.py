@@ -104,14 +104,17 @@ def jit(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function called from Python, whose arguments that are NamedTuples, of a chain or of a method, tell what it calls; compiled
-    at its first call with each."""
+    """A function called from Python, whose arguments that are NamedTuples, of a chain or of a method, tell what it calls, as do
+    those in them, of a chain's laws and load; compiled at its first call with each."""
 
     known: dict[tuple[type, ...], Callable[..., Any]] = {}
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
         kinds = tuple(map(type, arguments))
+        for argument in arguments:
+            if isinstance(argument, tuple):
+                kinds += tuple(map(type, argument))
         if kinds not in known:
             known[kinds] = compiled(function, *(kind for kind in kinds if kind in _FILES))
         return known[kinds](*arguments)

@@ -72,7 +72,7 @@ def potential(chain, work):
 
 @stub
 def vanishing(chain):
-    """Whether a heading can vanish."""
+    """Whether a heading can vanish, for a chain or a law of rolling."""
 
 
 @stub
@@ -119,6 +119,40 @@ def kinetic(state, chain, h):
 @stub
 def rate(state, chain, work, c, tau, move):
     """move = tau times the velocities at a state, the base position; c is room for C."""
+
+
+# What a chain or a field asks of its law of rolling, `chain.rolling`; `vanishing` too
+
+
+@stub
+def contact(law, radius, half, x, y):
+    """e = f J (a, b) and |e|^2 for r' = half (x, y): returns a, b, f, |e|^2."""
+
+
+@stub
+def jet(law, z, z1, z2):
+    """h, h', h'' for z, z', z'', complex numbers: as `discs.chains.rolling.law.RollingLaw.jet`."""
+
+
+# What a chain of slaved headings asks of its link law, `chain.links`; links (3, n + 1) as `discs.kernels.slaved` has them
+
+
+@stub
+def elastic(law, d):
+    """V of links."""
+
+
+@stub
+def tension(law, ends, before, d, g):
+    """g = mean derivative of V by the links over a step from `before` of which d is the middle; over none if they are the same.
+
+    What pulls at ghosts is put on the links that they are made of.
+    """
+
+
+@stub
+def assemble(law, ends, before, d, c, one, g, matrix):
+    """Entries of `one` I + g C^T (grad^2 V) C for that step; only how soon sweeps converge depends on them."""
 
 
 # What a chain asks of its load, `chain.load`

@@ -1,4 +1,4 @@
-"""The chain of slaved headings, linear curvature, in compiled form; its derivation and its plain twin are `discs.chains.slaved`.
+"""The chain of slaved headings in compiled form; its derivation and its plain twin are `discs.chains.slaved`.
 
 Links are held with one more at each end: link j lies before disc j, link j + 1 after it. Around a ring links 0 and n are the
 same; at free ends they are the ghosts that make the headings there central, d_0 = 2 d_1 - d_2 ("springs", "paper") or
@@ -11,63 +11,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.chains.chain import Chain
-from discs.chains.springs import LinearCurvature
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.limits import LOST_HEADING
 from discs.kernels.load import UNLOADED
 from discs.kernels.shared import forward, renew
-from discs.kernels.slaved_matrix import GHOST, PLAIN, RING, Matrix, assemble, factor, solve
+from discs.kernels.slaved_matrix import GHOST, PLAIN, RING, Matrix, factor, solve
 
 
 class Slaved(NamedTuple):
-    """Parameters. radius : (n,). weights : (3, n), inertia against each row's rate. bend : (n,), K w/k**4, against the
-    difference of a disc's links. torsion : (n + 1,), beta/k.
-
-    hessian : (3, n), grad^2 V by x or y: diagonal, i with i + 1, i with i + 2. corner : (2,), 0 with 3 and n - 4 with n - 1.
-    twist : (2, n), by theta: diagonal, i with i + 1.
-    """
+    """Parameters. radius : (n,). weights : (3, n), inertia against each row's rate. rolling, links : of the laws, their kinds tell
+    which."""
 
     radius: NDArray
     weights: NDArray
-    bend: NDArray
-    torsion: NDArray
-    hessian: NDArray
-    corner: NDArray
-    twist: NDArray
     scale: NDArray
     shift: NDArray
     k: float
     ends: int
-    unit: bool
+    rolling: Any
+    links: Any
     load: Any
 
 
 def parameters(
-    given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, springs: LinearCurvature, load: Any = None
+    given: Chain, weights: NDArray, scale: NDArray, shift: NDArray, rolling: Any, links: Any, load: Any = UNLOADED
 ) -> Slaved:
-    """The parameters of a chain and its load."""
-    n, ring = given.n, given.ends == "ring"
-    torsion, corner = np.zeros(n + 1), np.zeros(2)
-    torsion[1 : n + ring] = springs.twist
-    torsion[0] = torsion[n]
-    hessian, twist = springs.bands()
-    corner[:] = hessian[3, [0, n - 4]] if given.ends == "consistent" else 0.0
-    return Slaved(
-        radius=np.array(given.radius),
-        weights=weights,
-        bend=springs.bend,
-        torsion=torsion,
-        hessian=hessian[:3],
-        corner=corner,
-        twist=twist,
-        scale=scale,
-        shift=shift,
-        k=given.k,
-        ends=RING if ring else GHOST if given.ends == "consistent" else PLAIN,
-        unit=given.rolling == "unit",
-        load=load or UNLOADED,
-    )
+    """The parameters of a chain, from those of its laws and its load."""
+    ends = {"ring": RING, "consistent": GHOST}.get(given.ends, PLAIN)
+    return Slaved(np.array(given.radius), weights, scale, shift, given.k, ends, rolling, links, load)
 
 
 class Work(NamedTuple):
@@ -146,53 +118,15 @@ def moved(chain, base, move, d, rows):
 
 @part
 def frame_of(chain, d, c):
-    """C of links: e = R J r' or R J r'/|r'|, r' = (d_i + d_{i+1})/2k."""
+    """C of links, r' = (d_i + d_{i+1})/2k."""
     n = c.shape[1]
     dx, dy, cx, cy, ct = d[0], d[1], c[0], c[1], c[2]
     radius, mass, spin = chain.radius, chain.weights[0], chain.weights[2]
     half = 0.5 / chain.k
-    if chain.unit:
-        for i in range(n):
-            x, y = dx[i] + dx[i + 1], dy[i] + dy[i + 1]
-            e = radius[i] / np.sqrt(x * x + y * y)
-            t = 1 / np.sqrt(spin[i] + mass[i] * (radius[i] * radius[i]))
-            ct[i], cx[i], cy[i] = t, -y * (e * t), x * (e * t)
-    else:
-        for i in range(n):
-            e = radius[i] * half
-            x, y = (dx[i] + dx[i + 1]) * e, (dy[i] + dy[i + 1]) * e
-            t = 1 / np.sqrt(spin[i] + mass[i] * (x * x + y * y))
-            ct[i], cx[i], cy[i] = t, -y * t, x * t
-
-
-@part
-def tensions(chain, d, g):
-    """Derivative of V by the links, (3, n + 1), ghosts folded back to the links that they are made of."""
-    n = d.shape[1] - 1
-    bend = chain.bend
-    for row in range(2):
-        x, to = d[row], g[row]
-        # moments bend (d_{i+1} - d_i) of two discs pull at the link between them
-        before = bend[0] * (x[1] - x[0])
-        to[0] = -before
-        for j in range(1, n):
-            to[j] = bend[j - 1] * (x[j] - x[j - 1]) - bend[j] * (x[j + 1] - x[j])
-        to[n] = bend[n - 1] * (x[n] - x[n - 1])
-        if chain.ends == RING:
-            to[n] += to[0]
-            to[0] = to[n]
-        elif chain.ends == GHOST:
-            first, last = to[0], to[n]
-            to[1] += 3 * first
-            to[2] -= 3 * first
-            to[3] += first
-            to[n - 1] += 3 * last
-            to[n - 2] -= 3 * last
-            to[n - 3] += last
-            to[0], to[n] = 0.0, 0.0
-    theta, to = d[2], g[2]
-    for j in range(n + 1):
-        to[j] = chain.torsion[j] * theta[j]
+    for i in range(n):
+        x, y, e, square = do.contact(chain.rolling, radius[i], half, dx[i] + dx[i + 1], dy[i] + dy[i + 1])
+        t = 1 / np.sqrt(spin[i] + mass[i] * square)
+        ct[i], cx[i], cy[i] = t, -y * (e * t), x * (e * t)
 
 
 @fill(do.frame, Slaved)
@@ -204,7 +138,7 @@ def _frame(chain, work, move, c):
 @fill(do.gradient, Slaved)
 def _gradient(chain, work, move, g):
     moved(chain, work.base, move, work.links, 3)
-    tensions(chain, work.links, work.tension)
+    do.tension(chain.links, chain.ends, work.links, work.links, work.tension)
     for row in range(3):
         x, to = work.tension[row], g[row]
         for i in range(to.size):
@@ -214,7 +148,7 @@ def _gradient(chain, work, move, g):
 @fill(do.pullback, Slaved)
 def _pullback(chain, work, state, t, move, c, p, g):
     moved(chain, work.base, move, work.links, 3)
-    tensions(chain, work.links, work.tension)
+    do.tension(chain.links, chain.ends, work.links, work.links, work.tension)
     x, y, z = work.tension
     cx, cy, ct, to = c[0], c[1], c[2], g[0]
     for i in range(to.size):
@@ -237,14 +171,14 @@ def _sweep(chain, work, state, t, h, p, move, first):
         if chain.ends == RING:
             to[n] = base[n] + half * (f[0] * q[0] - f[n - 1] * q[n - 1])
     close_ends(chain.ends, work.links)
-    tensions(chain, work.links, work.tension)
+    do.tension(chain.links, chain.ends, work.base, work.links, work.tension)
     x, y, z = work.tension
     cx, cy, ct = c
     before = state.pi[0]
     for i in range(n):
         pull = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (z[i] - z[i + 1])
         b[i] = before[i] - q[i] - half * pull
-    assemble(chain, c, 1.0, half * half, m.a, m.u, m.w, m.corner)
+    do.assemble(chain.links, chain.ends, work.base, work.links, c, 1.0, half * half, m)
     if do.loaded(chain.load):
         forward(c, p, work.step, half)
         do.push(chain.load, state, t + half, work.step, c, p, half, work.rhs)
@@ -258,7 +192,8 @@ def _sweep(chain, work, state, t, h, p, move, first):
 
 @fill(do.stiffness, Slaved)
 def _stiffness(chain, work, move, c, matrix):
-    assemble(chain, c, 0.0, 1.0, matrix.a, matrix.u, matrix.w, matrix.corner)
+    moved(chain, work.base, move, work.links, 3)
+    do.assemble(chain.links, chain.ends, work.links, work.links, c, 0.0, 1.0, matrix)
 
 
 @fill(do.precondition, Slaved)
@@ -279,23 +214,18 @@ def _correct(chain, matrix, r):
 
 @fill(do.potential, Slaved)
 def _potential(chain, work):
-    d, n = work.base, chain.radius.size
-    total = 0.0
-    for i in range(n):
-        x, y = d[0, i + 1] - d[0, i], d[1, i + 1] - d[1, i]
-        total += chain.bend[i] * (x * x + y * y) + chain.torsion[i + 1] * d[2, i + 1] ** 2
-    return 0.5 * total
+    return do.elastic(chain.links, work.base)
 
 
 @fill(do.vanishing, Slaved)
 def _vanishing(chain):
-    return chain.unit
+    return do.vanishing(chain.rolling)
 
 
 @fill(do.lost, Slaved)
 def _lost(chain, work, slope):
     d, half, worst, disc = work.base, 0.5 / chain.k, LOST_HEADING**2, -1
-    if not chain.unit:
+    if not do.vanishing(chain.rolling):
         return disc
     for i in range(slope.shape[1]):
         ax, ay = slope[0, i], slope[1, i]

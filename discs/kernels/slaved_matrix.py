@@ -25,12 +25,13 @@ class Matrix(NamedTuple):
 
 
 @part
-def assemble(chain, c, one, g, a, u, w, corner):
-    """Entries of `one` I + g C^T (grad^2 V) C."""
+def assemble(law, ends, c, one, g, m):
+    """Entries of `one` I + g C^T (grad^2 V) C, for a link law with the bands of grad^2 V."""
+    a, u, w, corner = m.a, m.u, m.w, m.corner
     n = a.size
     cx, cy, ct = c[0], c[1], c[2]
-    s0, s1, s2 = chain.hessian[0], chain.hessian[1], chain.hessian[2]
-    t0, t1 = chain.twist[0], chain.twist[1]
+    s0, s1, s2 = law.hessian[0], law.hessian[1], law.hessian[2]
+    t0, t1 = law.twist[0], law.twist[1]
     for i in range(n):
         a[i] = one + g * (s0[i] * (cx[i] * cx[i] + cy[i] * cy[i]) + t0[i] * (ct[i] * ct[i]))
     for i in range(n - 1):
@@ -38,14 +39,14 @@ def assemble(chain, c, one, g, a, u, w, corner):
     for i in range(n - 2):
         w[i] = g * (s2[i] * (cx[i] * cx[i + 2] + cy[i] * cy[i + 2]))
     u[n - 1], w[n - 2], w[n - 1] = 0.0, 0.0, 0.0
-    if chain.ends == RING:
+    if ends == RING:
         u[n - 1] = g * (s1[n - 1] * (cx[n - 1] * cx[0] + cy[n - 1] * cy[0]) + t1[n - 1] * (ct[n - 1] * ct[0]))
         w[n - 2] = g * (s2[n - 2] * (cx[n - 2] * cx[0] + cy[n - 2] * cy[0]))
         w[n - 1] = g * (s2[n - 1] * (cx[n - 1] * cx[1] + cy[n - 1] * cy[1]))
     corner[0] = corner[1] = 0
-    if chain.ends == GHOST:
-        corner[0] = g * (chain.corner[0] * (cx[0] * cx[3] + cy[0] * cy[3]))
-        corner[1] = g * (chain.corner[1] * (cx[n - 4] * cx[n - 1] + cy[n - 4] * cy[n - 1]))
+    if ends == GHOST:
+        corner[0] = g * (law.corner[0] * (cx[0] * cx[3] + cy[0] * cy[3]))
+        corner[1] = g * (law.corner[1] * (cx[n - 4] * cx[n - 1] + cy[n - 4] * cy[n - 1]))
 
 
 @part

@@ -42,7 +42,7 @@ def parameters(
     scale: NDArray,
     shift: NDArray,
     stiffness: NDArray,
-    load: Any = None,
+    load: Any = UNLOADED,
 ) -> Steered:
     """The parameters of a chain and its load; `stiffness` is that of its links, (4, n_links)."""
     ring = given.ends == "ring"
@@ -50,7 +50,7 @@ def parameters(
     padded[:, 1 : 1 + stiffness.shape[1]] = stiffness
     padded[:, 0] = padded[:, -1]
     paces = np.stack([given.radius / roots[0], 1 / roots[0], 1 / roots[1]])
-    return Steered(weights, paces, padded, scale, shift, given.k, ring, load or UNLOADED)
+    return Steered(weights, paces, padded, scale, shift, given.k, ring, load)
 
 
 class Work(NamedTuple):

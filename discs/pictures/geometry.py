@@ -11,6 +11,7 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float, Int
+from discs.chains.rolling import ROLLING
 from discs.mechanics import Trajectory
 from discs.solution import Solution
 
@@ -110,7 +111,7 @@ def off_between_frames(run: Solution, radius: float) -> float:
 
     With the increment D of a quantity between two frames and its rates a, b there times the step, the cubic through all four
     differs from the straight line by u (1 - u) [(1 - u) (a - D) - u (b - D)], at most a quarter of the larger of |a - D| and
-    |b - D|. Of theta the rates are omega. Positions move along J d_1 with the speed R omega (|r'| R omega, field law), and not
+    |b - D|. Of theta the rates are omega. Positions move along J d_1 with the speed R |h| omega, h of the law of rolling, and not
     along the axle; without a known R only that they do not is used.
     """
     if run.t.size < 2:
@@ -125,7 +126,7 @@ def off_between_frames(run: Solution, radius: float) -> float:
         if run.x_rate is not None and run.y_rate is not None:
             rate = np.stack([run.x_rate, run.y_rate], axis=1)
         else:
-            rate = size * run.omega[:, None] * turn(slopes(run) if _field_law(run) else along)
+            rate = size * run.omega[:, None] * _size(run) * turn(along)
         moved = np.hypot(*(_quarter(h, way[:, j], rate[:, j]) for j in range(2)))
     return float((turned + moved / radius).max())
 
@@ -134,6 +135,8 @@ def _quarter(h: Float, change: Float, rate: Float) -> Float:
     return 0.25 * np.maximum(np.abs(h * rate[:-1] - change), np.abs(h * rate[1:] - change))
 
 
-def _field_law(run: Solution) -> bool:
+def _size(run: Solution) -> Any:
+    """|h| of the law of rolling, (F, 1, N), or 1."""
     told = getattr(run.problem.chain, "rolling", None) if run.problem is not None else _scene(run).get("rolling")
-    return told == "field" and run.phi is None
+    law = ROLLING.get(str(told)) if run.phi is None else None
+    return 1.0 if law is None else law.size(np.hypot(*slopes(run).transpose(1, 0, 2)))[:, None]

@@ -15,7 +15,7 @@ from discs.skew import Phase, Placed
 from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which it is said, if kernels are not read from the cache
-_PREPARED: set[tuple[type, type]] = set()
+_PREPARED: set[tuple[type, ...]] = set()
 WATCHED = ("total", "size", "count", "due")  # of a watch, what a run goes on from
 CHUNK = 4_000_000  # discs times steps of a compiled call, then progress is shown; Ctrl-C is heard in every sweep
 
@@ -91,7 +91,7 @@ class March:
 
     def _prepare(self, quiet: bool) -> None:
         """Have the kernels compiled: once for all runs on a machine, read from disc once in a process."""
-        key = type(self.integrator), type(self.kernel)
+        key = (type(self.integrator), *map(type, self.kernel or ()))  # of the chain's laws and load too
         if key in _PREPARED:
             return
         from discs.kernels.compiled import compiling, uncached
@@ -259,9 +259,10 @@ class March:
 
     def _check_heading(self, lost: int | None, step: int, time: float, before: Any) -> None:
         if lost is not None:
+            law = getattr(self.problem.chain, "rolling", None)
             slope = np.hypot(*self.system.slope(self.system.shape(before.hi, before.lo)))[lost]
             raise SimulationError(
-                "a disc lost its heading: its neighbours met, r' = 0, and rolling='unit' has no direction there; "
+                f"a disc lost its heading: its neighbours met, r' = 0, and rolling={law!r} has no direction there; "
                 "end the run earlier, or take a smaller dt if the motion is not resolved",
                 step,
                 time,

@@ -1,0 +1,112 @@
+r"""True curvature: bending energy K phi'**2/2 with phi the direction of the line, and stretch energy A (|r'| - 1)**2/2.
+
+Strains are the turning of the line at disc i per length, (arg d_i - arg d_{i-1})/k with links d_i = r_{i+1} - r_i, and the stretch
+|d_i|/k - 1. Their secants are exact: with D = d_1 - d_0 and M = (d_0 + d_1)/2,
+
+    arg d_1 - arg d_0 = delta = (delta/sin delta) J M . D/(|d_0||d_1|),   |d_1| - |d_0| = 2 M . D/(|d_0| + |d_1|),
+
+since the cross product of d_0 and d_1 is that of M and D. The ends bear no bend: the natural condition is phi' = 0.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.chains.links.law import LinkLaw
+from discs.chains.rolling_discs import Assembly, folded
+
+if TYPE_CHECKING:
+    from discs.chains.chain import Chain
+
+
+class Line(NamedTuple):
+    """Secant of the true curvature: links before and after a step, (3, n_links), and gradients of their angle and length.
+
+    turn, stretch : (2, n_links), the vectors whose product with the change of a link is the change of its angle, length.
+    """
+
+    before: NDArray
+    after: NDArray
+    turn: NDArray
+    stretch: NDArray
+
+
+class TrueCurvature(LinkLaw):
+    """Bending energy K phi'**2/2 with phi the direction of the line, and stretch energy A (|r'| - 1)**2/2."""
+
+    name = "true"
+    quadratic, end_bends, stretches, directed = False, False, True, True
+    parameters = None
+
+    @staticmethod
+    def density(bending: float, stretching: float, z: NDArray, z1: NDArray) -> NDArray:
+        turning = (z.conj() * z1).imag / np.abs(z) ** 2 if bending else 0.0
+        density: NDArray = bending * turning**2 + stretching * (np.abs(z) - 1) ** 2
+        return density
+
+    def __init__(self, chain: "Chain") -> None:
+        n, k = chain.n, chain.k
+        self._k, self._ring = k, chain.ends == "ring"
+        self._bending = np.asarray(chain.bending_stiffness) * chain.bend_shares
+        self._stretching = np.asarray(chain.stretch_stiffness) * k
+        self._torsion = np.asarray(chain.torsion_stiffness) * k
+        self._first = np.arange(n if self._ring else n - 1)  # a link's first and second disc
+        self._second = (self._first + 1) % n
+        middle = np.arange(n) if self._ring else np.arange(1, n - 1)
+        place = np.argsort(folded(n)) if self._ring else np.arange(n)
+        bends = np.stack([place[middle - 1], place[middle], place[(middle + 1) % n]], axis=1)
+        self._assembly = Assembly(bends, np.stack([place[self._first], place[self._second]], axis=1))
+
+    def _neighbours(self, values: NDArray) -> tuple[NDArray, NDArray]:
+        """Values of links (..., n_links) before and after each bend."""
+        return (np.roll(values, 1, axis=-1), values) if self._ring else (values[..., :-1], values[..., 1:])
+
+    def _around(self, values: NDArray) -> tuple[NDArray, NDArray]:
+        """Values of bends (n_bends,) at the first and the second disc of each link; zero where there is no bend."""
+        at_discs = values if self._ring else np.pad(values, 1)
+        return at_discs[self._first], at_discs[self._second]
+
+    def _turning(self, d: NDArray) -> NDArray:
+        """Turning per length at the bends, (n_bends,): each less than half a turn."""
+        a, b = self._neighbours(d[:2])
+        return np.arctan2(a[0] * b[1] - a[1] * b[0], (a * b).sum(axis=0)) / self._k
+
+    def potential(self, d: NDArray) -> float:
+        stretch, twist = np.hypot(d[0], d[1]) / self._k - 1, d[2] / self._k
+        return 0.5 * float(self._bending @ self._turning(d) ** 2 + self._stretching @ stretch**2 + self._torsion @ twist**2)
+
+    def polarised(self, d: NDArray, other: NDArray) -> float:
+        raise ValueError("V is not quadratic with curvature='true'")
+
+    def secant(self, d: NDArray, change: NDArray) -> Line:
+        after = d + change
+        middle = (d + 0.5 * change)[:2]
+        a, b = np.hypot(d[0], d[1]), np.hypot(after[0], after[1])
+        across = np.array([-middle[1], middle[0]])
+        delta = np.arctan2((across * change[:2]).sum(axis=0), (d[:2] * after[:2]).sum(axis=0))
+        # delta/sin(delta), safe at zero; a link that turns by half a turn in one step has no mean direction
+        return Line(d, after, across / (np.sinc(delta / np.pi) * a * b), 2 * middle / (a + b))
+
+    def tension(self, secant: Line) -> NDArray:
+        before, after, turn, stretch = secant
+        moment = self._bending * 0.5 * (self._turning(before) + self._turning(after))
+        length = 0.5 * (np.hypot(before[0], before[1]) + np.hypot(after[0], after[1]))
+        tension = np.empty_like(before)
+        before_bend, after_bend = self._around(moment)
+        tension[:2] = (turn * (before_bend - after_bend) + stretch * (self._stretching * (length / self._k - 1))) / self._k
+        tension[2] = self._torsion * 0.5 * (before[2] + after[2]) / self._k**2
+        return tension
+
+    def stiffness(self, secant: Line, c: NDArray) -> NDArray:
+        """Bends join a disc with its two neighbours, links join two discs."""
+        k, sides = self._k, (self._first, self._second)
+        turn = [(secant.turn * c[:2, disc]).sum(axis=0) / k for disc in sides]
+        (before_first, after_first), (before_second, after_second) = (self._neighbours(t) for t in turn)
+        bends = np.stack([before_first, -before_second - after_first, after_second], axis=1)[:, None, :]
+        links = np.empty((self._first.size, 2, 2))
+        for side, (disc, sign) in enumerate(zip(sides, (-1 / k, 1 / k), strict=True)):
+            links[:, 0, side] = sign * (secant.stretch * c[:2, disc]).sum(axis=0)
+            links[:, 1, side] = sign * c[2, disc]
+        stiffness = np.stack([self._stretching, self._torsion], axis=1)
+        return self._assembly((bends, self._bending[:, None]), (links, stiffness))
