@@ -11,6 +11,7 @@ from compare.hardcases.table import Stability, kept, stability
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
+from compare.results import WorkPrecision
 from compare.sweeps import read
 from compare.trust import Trust, gathered, trust
 from continuum import Scene, steered_rod, untwisting_rod
@@ -168,7 +169,7 @@ def write_stability(found: Stability, out: str) -> None:
 
 def run_precision(options: argparse.Namespace) -> None:
     """Measure speed against error and write table and picture; what an interrupted run has finished goes to files of its own."""
-    found, name, stopped = precision.WorkPrecision([], {}, {}), "precision", False
+    found, name, stopped = WorkPrecision([], {}, {}), "precision", False
     with fresh_files(options.out) as folder:
         scenes = {law: LAWS[law]() for law in options.laws}
         try:

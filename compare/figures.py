@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from compare.results import Growth, Study, WorkPrecision
 from continuum import Scene
 from discs import Solution
 from discs.arrays import Float
@@ -17,12 +18,6 @@ from discs.pictures import figures as of_discs
 from discs.pictures import geometry
 from discs.pictures.figures import given_or_new
 from discs.pictures.style import BLUE, GREEN, GREY, LABEL, ORANGE, PURPLE
-
-if TYPE_CHECKING:
-    from compare.hardcases.problems import Growth
-    from compare.hardcases.table import Stability
-    from compare.precision import WorkPrecision
-    from compare.study import Study
 
 KIND = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
@@ -33,7 +28,7 @@ def save(ax: Axes, path: str | Path) -> None:
     ax.figure.savefig(path, dpi=150)  # type: ignore[union-attr]
 
 
-def convergence(studies: Sequence["Study"], ax: Axes | None = None) -> Axes:
+def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
     """Error against number of discs, log-log, with slopes −1 and −2 and the field's own error estimate."""
     ax = given_or_new(ax, 6.8, 5.6)
     ax.set_xscale("log")
@@ -151,7 +146,7 @@ def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
 OURS = {"midpoint": BLUE, "suzuki4": ORANGE, "gauss4": "#56B4E9", "gauss6": GREEN, "gauss8": PURPLE, "auto": "black"}
 
 
-def precision(study: "WorkPrecision") -> list[Axes]:
+def precision(study: WorkPrecision) -> list[Axes]:
     """Error against time, log-log, a row of panels for each problem: our methods in colour, peers in grey, each with
     its mark."""
     names = list(dict.fromkeys(name for name, _ in study.problems))
@@ -187,30 +182,31 @@ def precision(study: "WorkPrecision") -> list[Axes]:
     return list(grid.ravel())
 
 
-def stability(study: "Stability", growth: "dict[str, Growth]") -> list[Axes]:
-    """Energy error against h/k for each method, crosses where steps were not converged, nothing where it stopped, and the growth
-    of waves on the straight rolling rod by law."""
+def stability(size: str, drifts: dict[str, list[tuple[float, float, int]]], growth: dict[str, Growth]) -> list[Axes]:
+    """Energy error against h/k for each method, and the growth of waves on the straight rolling rod by law.
+
+    Parameters
+    ----------
+    size : of the chain, in words.
+    drifts : method -> (h/k, relative error of the energy or NaN where it stopped, steps that were not converged: a cross).
+    growth : law -> growth rates.
+    """
     figure = Figure(figsize=(11.5, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    rows = [row for row in study.rows if row.case == "step above the explicit limit"]
-    settings = list(dict.fromkeys(row.setting.split(",")[0] for row in rows))
     colours = (BLUE, ORANGE, GREEN, PURPLE, "black", "#56B4E9", "#F0E442", "#A0522D", GREY)
-    for method, colour in zip(dict.fromkeys(row.method for row in rows), colours, strict=False):
-        run = [r for r in rows if r.method == method and r.setting.startswith(settings[-1])]
-        multiple = [float(r.setting.split("h = ")[1].split()[0]) for r in run]
-        drift = [max(r.found.energy, 1e-16) if r.found.outcome == "done" else np.nan for r in run]
+    for (method, points), colour in zip(drifts.items(), colours, strict=False):
+        multiple, drift, unconverged = np.array(points).T
         if np.isfinite(drift).any():
             left.loglog(multiple, drift, "o-", color=colour, label=method, markersize=4)
-        said = [(m, d) for m, d, r in zip(multiple, drift, run, strict=True) if r.found.unconverged]
-        left.loglog([m for m, _ in said], [d for _, d in said], "x", color=colour, markersize=9)
+        left.loglog(multiple[unconverged > 0], drift[unconverged > 0], "x", color=colour, markersize=9)
     left.set_xlabel("h/k")
     left.set_ylabel("relative error of the energy")
-    left.set_title(f"paper's scene, {settings[-1] if settings else ''}; × steps unconverged, no point: stopped", fontsize="medium")
+    left.set_title(f"paper's scene, {size}; × steps unconverged, no point: stopped", fontsize="medium")
     left.set_xticks([1, 2, 4, 8, 16, 32, 64], minor=False)
     left.xaxis.set_major_formatter(ScalarFormatter())
     left.xaxis.set_minor_formatter(NullFormatter())
     left.grid(alpha=0.3)
-    if rows:
+    if drifts:
         left.legend(fontsize=8, loc="upper left")
     for (law, waves), colour, mark in zip(growth.items(), (ORANGE, BLUE), "os", strict=False):
         right.plot(waves.q, waves.relation, "-", color=colour, label=f"{law} law, dispersion relation of 33 discs")

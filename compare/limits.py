@@ -14,7 +14,8 @@ from tqdm import tqdm
 from compare import figures
 from compare.lump import lump
 from compare.outputs import fresh_files
-from compare.study import Study, convergence, format_table
+from compare.results import Study, format_table
+from compare.study import convergence
 from continuum import solve, steered_rod, untwisting_rod
 from discs import Solution, simulate
 from discs.arrays import Float

@@ -11,7 +11,8 @@ from tqdm import tqdm
 from compare import figures
 from compare.lump import lump
 from compare.outputs import fresh_files
-from compare.study import Study, checked_sizes, convergence, format_table, write_csv
+from compare.results import Study, format_table, write_csv
+from compare.study import checked_sizes, convergence
 from continuum import Scene, solve
 from discs import Solution, simulate, suggest_dt
 

@@ -1,161 +1,26 @@
 """Speed against error: our methods and what a user would take instead, one problem, one machine, one run."""
 
-import csv
 import time as clock
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from tqdm import tqdm
 
-from compare import figures
 from compare.entrants import ours, peers
 from compare.lump import lump
 from compare.peers.peer import Cutoff, Peer
+from compare.reference import distance, reference
+from compare.results import Row, WorkPrecision
 from continuum import Scene
-from discs import Gauss8, Problem, SimulationError, checks, simulate
+from discs import Problem, SimulationError, checks
 from discs.arrays import Float
 
 SIZES = (32, 128, 512, 2048)
 WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
 FAILURES = (ArithmeticError, SimulationError, RuntimeError, ValueError)  # of a run, that stay in the table
-ERRORS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-
-
-class Row(NamedTuple):
-    """One method with one setting on one problem.
-
-    error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
-    seconds : median of the rounds, or mean of a long run's two times. steps, gradients, solves : what it took, None where a peer
-    does not tell. remark : why there is no result, or what is wrong with it.
-    """
-
-    problem: str
-    n: int
-    method: str
-    ours: bool
-    setting: float = np.nan
-    error: float = np.nan
-    seconds: float = np.nan
-    steps: int | None = None
-    gradients: int | None = None
-    solves: int | None = None
-    remark: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class WorkPrecision:
-    """Speed against error.
-
-    Attributes
-    ----------
-    rows : one for each method, setting and problem, failures included.
-    references : (problem, n) -> estimated error of the reference.
-    differences : method -> how it differs from the problem the others solve.
-    """
-
-    rows: list[Row]
-    references: dict[tuple[str, int], float]
-    differences: dict[str, str]
-
-    @property
-    def problems(self) -> list[tuple[str, int]]:
-        """The problems, by name and number of discs."""
-        return list(dict.fromkeys((row.problem, row.n) for row in self.rows))
-
-    def curve(self, problem: str, n: int, method: str) -> tuple[Float, Float]:
-        """Errors and seconds of a method, from loose to tight, without what is slower and less accurate than another of its
-        runs."""
-        found = [(r.error, r.seconds) for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method) and r.error < 1]
-        best = [(e, s) for e, s in found if not any(f <= e and t <= s and (f, t) != (e, s) for f, t in found)]
-        errors, seconds = np.array(sorted(best, reverse=True)).reshape(-1, 2).T
-        return errors, seconds
-
-    def time_at(self, error: float, problem: str, n: int, ours: bool) -> tuple[float, str]:
-        """The least time that any method takes to an error (interpolated between its runs, log-log), and its name; infinite if
-        none does."""
-        best = np.inf, ""
-        for method in dict.fromkeys(r.method for r in self.rows if r.ours == ours):
-            errors, seconds = self.curve(problem, n, method)
-            if errors.size and errors[-1] <= error:
-                at = float(np.exp(np.interp(-np.log(error), -np.log(errors), np.log(seconds))))
-                best = min(best, (at, method))
-        return best
-
-    def speedups(self, errors: Iterable[float] = ERRORS) -> str:
-        """How many times faster ours are than the fastest peer at equal error, as a table."""
-        lines = ["| problem | N | error | ours | | fastest peer | | times |", "| --- " * 8 + "|"]
-        for problem, n in self.problems:
-            for error in errors:
-                (ours, mine), (peers, other) = self.time_at(error, problem, n, True), self.time_at(error, problem, n, False)
-                if not np.isfinite(ours):
-                    continue
-                ratio = f"{peers / ours:.0f}" if np.isfinite(peers) else "no peer"
-                there = f"{1e3 * peers:.3g} ms" if np.isfinite(peers) else "–"
-                lines.append(
-                    f"| {problem} | {n} | {error:.0e} | {mine} | {1e3 * ours:.3g} ms | {other or '–'} | {there} | {ratio} |"
-                )
-        return "\n".join(lines)
-
-    def table(self) -> str:
-        """All runs, as a table."""
-        lines = ["| problem | N | method | setting | error | ms | steps | gradients | solves | remark |", "| --- " * 10 + "|"]
-        for r in self.rows:
-            counts = " | ".join("–" if c is None else str(c) for c in (r.steps, r.gradients, r.solves))
-            error = f"{r.error:.1e}" if np.isfinite(r.error) else "–"
-            lines.append(
-                f"| {r.problem} | {r.n} | {r.method} | {r.setting:.3g} | {error} | {1e3 * r.seconds:.3g} | {counts} | {r.remark} |"
-            )
-        return "\n".join(lines)
-
-    def report(self) -> str:
-        """Speedups, what differs, and all runs, in Markdown."""
-        floor = max(self.references.values(), default=0.0)
-        return "\n\n".join(
-            [
-                "# Speed against error",
-                f"Ours against the fastest peer at equal error. Reference: gauss8 with short steps, off by at most {floor:.1e}.",
-                self.speedups(),
-                *(f"* {name}: {how}." for name, how in self.differences.items()),
-                "All runs; errors relative to the largest value of each of x, y, θ (φ); times are medians, "
-                "of long runs means of two.",
-                self.table(),
-            ]
-        )
-
-    def save(self, path: str | Path) -> None:
-        """All runs, as CSV."""
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(Row._fields)
-            writer.writerows(self.rows)
-
-    def plot(self, path: str | Path | None = None) -> Sequence[Axes]:
-        """Error against time, a panel for each problem; saved if a path is given."""
-        axes = figures.precision(self)
-        if path is not None:
-            figures.save(axes[0], path)
-        return axes
-
-
-def reference(problem: Problem) -> tuple[Float, float]:
-    """Positions at the end by "gauss8" with short steps, (rows, n), and what halving them changes."""
-    found = []
-    for steps in (1000, 2000) if problem.system.kernel is not None else (250, 500):  # the plain form takes 50 times as long
-        run = simulate(problem, Gauss8(tolerance=1e-14, sweeps=20), problem.duration / steps, frames=1, progress=False)
-        found.append(np.array([getattr(run, row)[-1] for row in problem.system.rows]))
-    return found[1], distance(found[0], found[1])
-
-
-def distance(q: Float, exact: Float) -> float:
-    """Largest difference, each row relative to its largest value, absolute of a row that is zero."""
-    size = np.abs(exact).max(axis=1)
-    return float((np.abs(q - exact).max(axis=1) / np.where(size > 0, size, 1.0)).max())
 
 
 def work_precision(

@@ -28,7 +28,8 @@ from compare.outputs import fresh_files
 from compare.peers import reduced
 from compare.peers.peer import Peer
 from compare.precision import work_precision
-from compare.study import Study, convergence
+from compare.results import Study
+from compare.study import convergence
 from continuum import Scene, solve, untwisting_rod
 from discs import Problem, Solution, checks
 from discs.pictures import geometry

@@ -4,12 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from time import thread_time as processor
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from compare.hardcases.runs import EXPLICIT, FRAMES, PEERS, Found, march, motion, peer, posed
 from compare.lump import lump
+from compare.results import Growth
 from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.dispersion import frequency, growth, symbols
 from continuum.exact import ring, standing_wave
@@ -87,14 +88,6 @@ def rounding(make: Callable[[], Problem], dt: float, method: str, seconds: float
     c, d, x, y = np.cos(angle), np.sin(angle), other[0] - move[0], other[1] - move[1]
     back = np.array([c * x + d * y, c * y - d * x, other[2]])
     return found._replace(error=float(np.abs(back - q).max()))
-
-
-class Growth(NamedTuple):
-    """Growth rates of waves on a rolling rod: wave numbers q (modes,), measured and by the dispersion relation of the discs."""
-
-    q: Float
-    measured: Float
-    relation: Float
 
 
 def rolling_waves(

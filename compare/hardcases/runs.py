@@ -12,7 +12,7 @@ import numpy as np
 
 from compare.peers import reduced
 from compare.peers.peer import Cutoff
-from compare.precision import reference
+from compare.reference import distance, reference
 from discs import Problem, SimulationError, Solution, simulate, suggest_dt
 from discs.arrays import Float
 from discs.integrators import Integrator
@@ -242,10 +242,4 @@ def motion(
         if run is not None and note is not None:
             found = found._replace(note=note(problem, run))
     known = _known(make, exact) if q is not None and (compared or exact) else None
-    return found if q is None or known is None else found._replace(error=_off(q, known))
-
-
-def _off(q: Float, known: Float) -> float:
-    """Largest error, each row relative to its largest value; absolute where that is rounding."""
-    size = np.abs(known).max(axis=1, keepdims=True)
-    return float((np.abs(q - known) / np.where(size > 1e-12, size, 1.0)).max())
+    return found if q is None or known is None else found._replace(error=distance(q, known))

@@ -15,8 +15,9 @@ import numpy as np
 from compare import figures
 from compare.background import background
 from compare.hardcases.cases import Case, cases
-from compare.hardcases.problems import Growth, rolling_waves
+from compare.hardcases.problems import rolling_waves
 from compare.hardcases.runs import OURS, PEERS, RTOL, TOL, Found
+from compare.results import Growth
 from compare.sweeps import Result, read, sweep
 from discs import checks
 
@@ -129,9 +130,18 @@ class Stability:
         found = {law: rolling_waves(33, law, 0.7, 4.0, "midpoint", np.inf)[1] for law in ("field", "unit")}
         return {law: growth for law, growth in found.items() if growth is not None}
 
+    def drifts(self) -> tuple[str, dict[str, list[tuple[float, float, int]]]]:
+        """Of the largest chain with steps above the explicit limit: its size, and by method h/k, drift and unconverged steps."""
+        found: dict[str, dict[str, list[tuple[float, float, int]]]] = {}
+        for row in (row for row in self.rows if row.case == "step above the explicit limit"):
+            size, step = row.setting.split(", h = ")
+            drift = max(row.found.energy, 1e-16) if row.found.outcome == "done" else np.nan
+            found.setdefault(size, {}).setdefault(row.method, []).append((float(step.split()[0]), drift, row.found.unconverged))
+        return list(found.items())[-1] if found else ("", {})
+
     def plot(self, path: str | Path | None = None) -> Any:
         """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
-        axes = figures.stability(self, self.waves)
+        axes = figures.stability(*self.drifts(), self.waves)
         if path is not None:
             figures.save(axes[0], path)
         return axes

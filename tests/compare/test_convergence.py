@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compare import convergence, lump
-from compare.study import write_csv
+from compare.results import write_csv
 from continuum import breathing_ring, solve, untwisting_rod
 
 

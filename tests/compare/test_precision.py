@@ -10,7 +10,8 @@ from compare.__main__ import main
 from compare.entrants import ours, peers
 from compare.peers import reduced
 from compare.peers.peer import Cutoff, Outcome, Peer
-from compare.precision import Row, WorkPrecision, distance, reference
+from compare.reference import distance, reference
+from compare.results import Row, WorkPrecision
 from continuum import untwisting_rod
 from discs import Problem
 from discs.kernels import driver

@@ -1,0 +1,21 @@
+"""Where a motion of discs ends, by "gauss8" with short steps, and how far another end is off."""
+
+import numpy as np
+
+from discs import Gauss8, Problem, simulate
+from discs.arrays import Float
+
+
+def reference(problem: Problem) -> tuple[Float, float]:
+    """Positions at the end by "gauss8" with short steps, (rows, n), and what halving them changes."""
+    found = []
+    for steps in (1000, 2000) if problem.system.kernel is not None else (250, 500):  # the plain form takes 50 times as long
+        run = simulate(problem, Gauss8(tolerance=1e-14, sweeps=20), problem.duration / steps, frames=1, progress=False)
+        found.append(np.array([getattr(run, row)[-1] for row in problem.system.rows]))
+    return found[1], distance(found[0], found[1])
+
+
+def distance(q: Float, exact: Float) -> float:
+    """Largest difference, each row relative to its largest value; absolute of a row that is zero or rounding."""
+    size = np.abs(exact).max(axis=1, keepdims=True)
+    return float((np.abs(q - exact) / np.where(size > 1e-12, size, 1.0)).max())
