@@ -1,7 +1,7 @@
 # make run: the main job, results in out/.   make test: the whole suite.   Both make .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
-PIP := $(BIN)/pip install --quiet --disable-pip-version-check --editable
+INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python
 # one thread for linear algebra: the matrices are small, threads only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -11,18 +11,35 @@ export NO_MKDOCS_2_WARNING := 1
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
     $(addprefix continuum/test_, cells.py lattice.py lagrangian.py))
 
-.PHONY: run test docs minimal coverage clean
+.PHONY: run test quick lint types own slaved field docs minimal coverage clean
 
 run: .venv/run
 	$(BIN)/python -m compare --out out
 
-test: .venv/test
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/python -m discs.kernels
-	$(BIN)/python -m continuum.kernels
+# ruff, mypy and typos beside the compiling of kernels, each a process: two cores are what every machine has
+test: .venv/dev
+	$(MAKE) --no-print-directory --jobs 2 lint own slaved types field
 	$(BIN)/pytest
+
+# a contributor's loop: no lessons, sites, browsers or methods that take long to compile
+quick: .venv/dev
+	$(MAKE) --no-print-directory --jobs 2 lint types
+	$(BIN)/pytest -m "not slow"
+
+lint: .venv/dev
+	$(BIN)/ruff check --quiet .
+	$(BIN)/ruff format --check --quiet .
+	$(BIN)/typos
+
+types: .venv/dev
+	$(BIN)/mypy
+
+# compiled ahead, once on a machine: of discs with slaved and with their own headings, and of the field
+own slaved: .venv/dev
+	$(BIN)/python -m discs.kernels $@
+
+field: .venv/dev
+	$(BIN)/python -m continuum.kernels
 
 # the lessons with their pictures, and the site; open site/index.html
 docs: .venv/docs
@@ -34,34 +51,32 @@ minimal: .venv/minimal
 	.venv/oldest/bin/python -m pytest -W default $(MINIMAL)
 
 # lines of the three packages that the suite reaches, command lines and workers included; those of kernels as plain Python
-coverage: .venv/test
-	$(BIN)/python -m discs.kernels
-	$(BIN)/python -m continuum.kernels
+coverage: .venv/dev own slaved field
 	$(BIN)/pytest --cov --cov-report= --cov-fail-under=0
 	NUMBA_DISABLE_JIT=1 $(BIN)/pytest --cov --cov-append --cov-report=term-missing -k "twins or elimination or reduced or collapse" \
 	    tests/discs/test_kernels.py tests/discs/test_simulate.py tests/continuum/test_spectral.py
 
 .venv/made:
 	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check uv # installs in seconds what takes pip over a minute
 	touch $@
 
 .venv/run: .venv/made pyproject.toml
-	$(PIP) .
+	$(INSTALL) --editable .
 	touch $@
 
 # where a peer has no wheel its tests are skipped, and say so
-.venv/test: .venv/made pyproject.toml
-	$(PIP) ".[test,peers]" || $(PIP) ".[test]"
+.venv/dev: .venv/made pyproject.toml
+	$(INSTALL) --group dev --editable ".[cluster,contact,peers]" || $(INSTALL) --group dev --editable ".[cluster,contact]"
 	touch $@
 
 .venv/minimal: .venv/made pyproject.toml
-	$(BIN)/pip install --quiet --disable-pip-version-check uv
 	$(BIN)/uv venv --quiet --clear --python 3.11 .venv/oldest
-	VIRTUAL_ENV=.venv/oldest $(BIN)/uv pip install --quiet --resolution lowest-direct --editable ".[test]"
+	$(BIN)/uv pip install --quiet --python .venv/oldest --resolution lowest-direct --group test --editable ".[cluster,contact]"
 	touch $@
 
 .venv/docs: .venv/made pyproject.toml
-	$(PIP) ".[docs]"
+	$(INSTALL) --group docs --editable ".[contact]"
 	touch $@
 
 clean:

@@ -100,7 +100,8 @@ def test_a_disc_that_fills_up_on_the_way(tmp_path, monkeypatch):
         patched.setattr(recording, "SECONDS", -np.inf)
         patched.setattr(np, "savez", full)
         with pytest.warns(
-            UserWarning, match=r"run\.nc\.restart cannot be written: No space left on device; make room, .* goes on from the beginn"
+            UserWarning,
+            match=r"run\.nc\.restart cannot be written: No space left on device; make room, .* goes on from the beginning",
         ):
             found = simulate(PROBLEM, **SETTLED, checkpoint=path)
     equal(found, whole)
