@@ -11,14 +11,14 @@ export NO_MKDOCS_2_WARNING := 1
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
     $(addprefix continuum/test_, cells.py lattice.py lagrangian.py))
 
-.PHONY: run test quick lint types own slaved field docs minimal coverage clean
+.PHONY: run test quick lint types kernels field docs minimal coverage clean
 
 run: .venv/run
 	$(BIN)/python -m compare --out out
 
-# ruff, mypy and typos beside the compiling of kernels, each a process: two cores are what every machine has
+# side by side, as two cores are what every machine has
 test: .venv/dev
-	$(MAKE) --no-print-directory --jobs 2 lint own slaved types field
+	$(MAKE) --no-print-directory --jobs 4 lint types kernels field
 	$(BIN)/pytest
 
 # a contributor's loop: no lessons, sites, browsers or methods that take long to compile
@@ -34,9 +34,9 @@ lint: .venv/dev
 types: .venv/dev
 	$(BIN)/mypy
 
-# compiled ahead, once on a machine: of discs with slaved and with their own headings, and of the field
-own slaved: .venv/dev
-	$(BIN)/python -m discs.kernels $@
+# compiled ahead, once on a machine: of discs, a process for each kind of chain, and of the field
+kernels: .venv/dev
+	$(BIN)/python -m discs.kernels
 
 field: .venv/dev
 	$(BIN)/python -m continuum.kernels
@@ -51,7 +51,7 @@ minimal: .venv/minimal
 	.venv/oldest/bin/python -m pytest -W default $(MINIMAL)
 
 # lines of the three packages that the suite reaches, command lines and workers included; those of kernels as plain Python
-coverage: .venv/dev own slaved field
+coverage: .venv/dev kernels field
 	$(BIN)/pytest --cov --cov-report= --cov-fail-under=0
 	NUMBA_DISABLE_JIT=1 $(BIN)/pytest --cov --cov-append --cov-report=term-missing -k "twins or elimination or reduced or collapse" \
 	    tests/discs/test_kernels.py tests/discs/test_simulate.py tests/continuum/test_spectral.py
