@@ -1,4 +1,4 @@
-"""What comparisons return: tables that say themselves in text, CSV and pictures."""
+"""What comparisons return: tables, as text and CSV. Their pictures stand above this module, and are imported when wanted."""
 
 import csv
 from collections.abc import Iterable, Sequence
@@ -70,7 +70,7 @@ class Study:
 
     def plot(self, path: str | Path | None = None, *others: "Study", ax: "Axes | None" = None) -> "Axes":
         """Error against n, with `others` in the same axes; saved if a path is given."""
-        from compare import figures  # pictures are imported when one is wanted
+        from compare import figures
 
         ax = figures.convergence([self, *others], ax)
         if path is not None:
@@ -206,7 +206,7 @@ class WorkPrecision:
 
     def plot(self, path: str | Path | None = None) -> "Sequence[Axes]":
         """Error against time, a panel for each problem; saved if a path is given."""
-        from compare import figures  # pictures are imported when one is wanted
+        from compare import figures
 
         axes = figures.precision(self)
         if path is not None:

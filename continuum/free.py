@@ -10,6 +10,7 @@ from continuum.free_start import Data, Given, check
 from continuum.rod import Rod
 from discs import Solution, checks
 from discs.running.frames import frame_times
+from discs.running.stats import Stats
 from discs.simulation import MOST_STEPS
 
 MOST_NODES = 1_000_000
@@ -89,5 +90,5 @@ def free_rod(
     for word in (*words, done.off, doubt):
         if word:
             warnings.warn(word, stacklevel=2)
-    stats = {"method": "midpoint and RATTLE", "order": 2, "dt": h, "steps": done.steps}
+    stats: Stats = {"method": "midpoint and RATTLE", "order": 2, "dt": h, "steps": done.steps}
     return Solution(t=times, s=chain.s, energy=done.energy, error_estimate=errors, stats=stats, **done.fields)

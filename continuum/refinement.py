@@ -83,7 +83,7 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: NDArray, pro
         t=times,
         s=scene.rod.length / places * np.arange(values.shape[-1]),
         energy=np.array([found.energy(q) for q in runs[0].q]),
-        stats={"method": "elements", "order": DEGREE, "elements": found.count, "nodes": found.n, "dt": None},
+        stats={"method": "elements", "order": DEGREE, "elements": found.count, "nodes": found.n},
         error_estimate=error,
         **dict(zip(UNKNOWNS, values, strict=True)),
     )

@@ -27,6 +27,7 @@ from continuum.initial import resolve
 from continuum.rod import Scene
 from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
 from discs import SimulationError, Solution
+from discs.running.stats import Stats
 from discs.skew import Phase
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
@@ -235,7 +236,7 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: NDArray, pro
             raise ValueError(f"{error}{bent_hint(scene)}") from None
     rounded = {"x": scene.rod.length, "y": scene.rod.length}
     estimate = {name: error + sweeps(found.tolerance) * rounded.get(name, 1.0) for name, error in search.estimate.items()}
-    stats = {
+    stats: Stats = {
         "method": "spectral",
         "order": None,
         "functions": found.n,

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from discs.chains.stencils import ENDS
-from discs.files.archive import QUANTITIES, describe, load, named, replacing
+from discs.files.archive import load, named, replacing
 from discs.files.framefile import FrameFile
 from discs.files.safe import check_writable, fresh
+from discs.files.schema import QUANTITIES, describe
 from discs.files.untrusted import printable
 from discs.integrators import METHODS
 from discs.problem import Problem

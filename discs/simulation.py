@@ -15,6 +15,7 @@ from discs.integrators.base import Cut
 from discs.problem import Problem
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.recording import Recording, Rows, kept_settings
+from discs.running.stats import Stats
 from discs.running.step_error import WARNED, Watch, cure, doubts
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
@@ -130,7 +131,8 @@ def _search(
         found, doubt = error.best, f"{error.message}: this is the last run"
     if checkpoint is not None:
         integrator, dt = from_settings(found.stats["settings"]), found.stats["dt"]
-        searched, known = {name: found.stats[name] for name in ("tol", "attempts")}, found.error_estimate
+        searched = {"tol": found.stats["tol"], "attempts": found.stats["attempts"]}
+        known = found.error_estimate
         found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched, known)
     return found, doubt
 
@@ -157,7 +159,7 @@ def _run(
     engine: str,
     checkpoint: str | Path | None,
     checked: bool = True,
-    more: dict[str, Any] | None = None,
+    more: Stats | None = None,
     estimate: dict[str, float] | None = None,
 ) -> Solution:
     """One run; the arguments are those of `simulate`.
@@ -180,7 +182,7 @@ def _run(
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
-    about = {
+    about: Stats = {
         "method": integrator.name,
         "order": integrator.order,
         "settings": repr(integrator),
@@ -188,7 +190,8 @@ def _run(
         "want": list(want),
         "dt": h,
         "dt_suggested": suggested,
-    } | (more or {})
+    }
+    about |= more or {}
     record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about, estimate)
     steps, rest = steps_before(end, h)
     watch = Watch(steps, system.n) if checked and not integrator.adaptive else None
@@ -212,8 +215,10 @@ def _run(
             frame = partial(observed, march, rest, want, bool(offered))
             record.write(f, _uncut(frame, record, f, march))  # not kept here: the next step needs the room
             record.pause(f + 1, march)
-        told: dict[str, Any] = about | {"steps": march.step, **vars(march.work)}
-        if march.work.unconverged:
+        work = march.work
+        told: Stats = about | {"steps": march.step, "gradients": work.gradients, "solves": work.solves}
+        told["unconverged"] = work.unconverged
+        if work.unconverged:
             short = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
             told |= {"short_steps": short} | _uncut(march.remedy, record, times.size, march)
         if watch is not None:

@@ -1,4 +1,7 @@
-"""What a run returns."""
+"""What a run returns.
+
+It plots, views and saves itself: pictures and files stand above this module, and are imported when one of these methods is called.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.problem import Problem, State
+from discs.running.stats import Stats
 from discs.running.step_error import doubts
 
 if TYPE_CHECKING:
@@ -36,7 +40,7 @@ class Solution:
     rolling_residual : (F,), largest |r. - e omega| over the discs, length per time, of the method's own velocities: zero up to
         rounding. (Methods in (q, pi) form r. from e omega; that their steps roll is |r_{n+1} - r_n - e (theta_{n+1} - theta_n)| = 0
         with e at the midpoint.) None for an extrapolated field.
-    stats : what was done: method, order, dt and where it came from, steps, work, seconds.
+    stats : what was done: method, order, dt and where it came from, steps, work, seconds; see `discs.running.stats.Stats`.
     phi, phi_rate : (F, N), own headings, rad, and their rates, rad per time; only of discs that have them.
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
@@ -56,7 +60,7 @@ class Solution:
     omega: NDArray
     energy: NDArray
     rolling_residual: NDArray | None = None
-    stats: dict[str, Any] = field(default_factory=dict)
+    stats: Stats = field(default_factory=Stats)
     phi: NDArray | None = None
     x_rate: NDArray | None = None
     phi_rate: NDArray | None = None
@@ -129,7 +133,7 @@ class Solution:
 
     def plot(self, *panels: str, ax: Any = None) -> "list[Axes]":
         """A first look at the run: all panels, or those named; see `discs.pictures.figures.first_look`."""
-        from discs.pictures import figures  # pictures are imported when one is wanted
+        from discs.pictures import figures
 
         return figures.first_look(self, panels, ax)
 

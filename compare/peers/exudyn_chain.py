@@ -107,7 +107,7 @@ def exudyn_steered_peer(problem: Problem) -> Peer:
     def run(setting: float, seconds: float) -> Outcome:
         found = exudyn_steered(problem, problem.duration / setting)
         q = np.array([getattr(found, row)[-1] for row in problem.system.rows])
-        return Outcome(q, int(found.stats["steps"]), 0, found.stats.get("newton_iterations"), found.stats["seconds"])
+        return Outcome(q, int(found.stats["steps"]), 0, found.stats["iterations"], found.stats["seconds"])
 
     differs = "rigid wheels on its rolling joint, its own beam between them; 9 coordinates and 7 multipliers a disc"
     return Peer("Exudyn, wheels and beams", (45.0, 90.0, 180.0, 360.0), run, differs)

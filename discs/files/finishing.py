@@ -6,13 +6,13 @@ its variables, some kilobytes, is kept in the restart file before, and put back 
 
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from discs.arrays import Float
-from discs.files import archive, safe, untrusted
+from discs.files import safe, schema, untrusted
 from discs.files.framefile import FrameFile
+from discs.running.stats import Stats
 
 
 def outside(file: FrameFile) -> dict[str, Float]:
@@ -36,17 +36,17 @@ def put_back(path: Path, kept: dict[str, Float]) -> None:
         os.close(fd)
 
 
-def finish(file: FrameFile, stats: dict[str, Any]) -> None:
+def finish(file: FrameFile, stats: Stats) -> None:
     """Say in a file that it is complete, and its stats."""
     import h5py
 
-    text = archive.as_text(stats)
+    text = schema.as_text(stats)
     with h5py.File(file.path, "r+", locking=False) as header:
         kept = header.attrs.get_id("stats").dtype.itemsize
         if len(text) <= kept:
-            header.attrs.modify("stats", archive.fixed(text.ljust(kept)))
+            header.attrs.modify("stats", schema.fixed(text.ljust(kept)))
         else:
-            header.attrs["stats"] = archive.fixed(text)
+            header.attrs["stats"] = schema.fixed(text)
         header.attrs.modify("complete", 1)
     file.flush()
     file.attrs |= {"stats": untrusted.told("stats", text), "complete": 1}

@@ -14,12 +14,13 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
-from discs.files import archive, safe, untrusted
-from discs.files.archive import CHECKSUM, COORDINATES, PARAMETERS, QUANTITIES, Header, attributes, dimensions
+from discs.files import safe, schema, untrusted
+from discs.files.schema import CHECKSUM, COORDINATES, PARAMETERS, QUANTITIES, Header, attributes, dimensions
 from discs.problem import Problem
 from discs.solution import Solution
 
 NUMBER, COUNT = np.dtype("<f8"), np.dtype("<i8")
+MAPPED = 64 * 2**20  # bytes; arrays of larger files are mapped, not read
 PART = 2**24  # bytes that are read at once
 DAMAGE = (OSError, KeyError, TypeError, RuntimeError, ValueError, AttributeError, RecursionError, OverflowError)
 NEEDED = ("time", "s", "checksum", "x", "y", "theta", "omega", "energy")
@@ -80,7 +81,7 @@ class FrameFile:
                     variable[(0,) * len(dims)] = np.nan
             marks = file.create_variable("checksum", ("time",), COUNT, data=np.zeros(sizes["time"], COUNT))
             marks.attrs["long_name"] = CHECKSUM
-            file.attrs.update({key: archive.fixed(value) for key, value in attrs.items()})
+            file.attrs.update({key: schema.fixed(value) for key, value in attrs.items()})
         return cls(path, writable=True)
 
     @classmethod
@@ -103,7 +104,7 @@ class FrameFile:
                 return None
             if checks.whole("n", told.get("n"), 1) != self.places["s"][1][0]:
                 raise ValueError(f"n = {told['n']} of {self.places['s'][1][0]} discs")
-            return archive.rebuild(told, {name: value for name, value in self.static.items() if name in PARAMETERS})
+            return schema.rebuild(told, {name: value for name, value in self.static.items() if name in PARAMETERS})
         except DAMAGE as error:
             raise self._refusal(error) from None
 
@@ -123,7 +124,7 @@ class FrameFile:
         data = {name: np.ascontiguousarray(value, NUMBER) for name, value in rows.items()}
         for name, value in data.items():
             self._write(name, f, value)
-        self._write("checksum", f, np.array(archive.frame_checksum(data), COUNT))
+        self._write("checksum", f, np.array(schema.frame_checksum(data), COUNT))
 
     def flush(self) -> None:
         """Have everything on the disc, in case the power fails."""
@@ -138,7 +139,7 @@ class FrameFile:
         """How many frames from the first on are there, of at most so many."""
         marks, most = self._read("checksum"), self.frames if most is None else most
         for f in range(most):
-            if marks[f] == 0 or archive.frame_checksum({name: self._read(name, f) for name in self.recorded}) != marks[f]:
+            if marks[f] == 0 or schema.frame_checksum({name: self._read(name, f) for name in self.recorded}) != marks[f]:
                 return f
         return most
 
@@ -196,7 +197,7 @@ class FrameFile:
 
     def _rows(self, name: str, count: int) -> Float:
         offset, (_, *rest) = self.places[name]
-        if self.size > archive.MAPPED:
+        if self.size > MAPPED:
             with open(os.dup(self._fd), "rb") as file:
                 return np.memmap(file, NUMBER, "c", offset, (count, *rest))
         return self._read(name)[:count]
@@ -213,8 +214,8 @@ class FrameFile:
 
         places = {}
         with h5py.File(self.path, "r", locking=False) as file:
-            if "format" not in file.attrs or self._attribute(file, "format") != archive.FORMAT:
-                raise ValueError(f"its attribute 'format' is not {archive.FORMAT!r}")
+            if "format" not in file.attrs or self._attribute(file, "format") != schema.FORMAT:
+                raise ValueError(f"its attribute 'format' is not {schema.FORMAT!r}")
             self.attrs: dict[str, Any] = {name: self._attribute(file, name) for name in (*untrusted.TEXTS, "complete", "checksum")}
             for name in (*QUANTITIES, *PARAMETERS, *COORDINATES, "checksum"):
                 if name not in file:
@@ -254,7 +255,7 @@ class FrameFile:
 
     def _check_header(self) -> None:
         """Check what the header says; sets `attrs` to it."""
-        if archive.header_checksum(self.attrs, self.static) != self.attrs["checksum"]:
+        if schema.header_checksum(self.attrs, self.static) != self.attrs["checksum"]:
             raise ValueError("parameters, times or places are not what was written")
         self.attrs |= {name: untrusted.told(name, self.attrs[name]) for name in untrusted.TEXTS}
 

@@ -13,6 +13,7 @@ from discs import checks
 from discs.arrays import Float, Int
 from discs.chains.rolling import ROLLING
 from discs.mechanics import Trajectory
+from discs.running.stats import Stats
 from discs.solution import Solution
 
 TOO_FAR = 0.2  # of the drawn radius: what a point of a rim may be off between two frames
@@ -90,7 +91,7 @@ def one_disc(path: Trajectory, radius: float) -> Solution:
         raise ValueError(f"one disc has the coordinates x, y, theta, phi; got {path.q.shape[1]} of them")
     named = dict(zip(("x", "y", "theta", "phi"), path.q.T[..., None], strict=True))
     rates = dict(zip(("x_rate", "y_rate", "omega", "phi_rate"), path.v.T[..., None], strict=True))
-    stats = {"method": "textbook", "radius": checks.number("radius", radius, positive=True)}
+    stats: Stats = {"method": "textbook", "radius": checks.number("radius", radius, positive=True)}
     return Solution(t=path.t, s=np.zeros(1), **named, **rates, energy=path.energy, stats=stats)
 
 

@@ -11,18 +11,19 @@ import threading
 import time as clock
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
-from discs.files import archive, safe, untrusted
+from discs.files import archive, safe, schema, untrusted
 from discs.files.finishing import finish, outside
 from discs.files.framefile import FrameFile, room
 from discs.files.restart import FROM_THE_BEGINNING, Restart
 from discs.integrators import Integrator, from_settings
 from discs.problem import Problem
+from discs.running.stats import Stats
 from discs.running.time_loop import March
 from discs.solution import Solution
 from discs.warn import warn
@@ -63,7 +64,7 @@ class Rows:
     def pause(self, f: int, march: March) -> None:
         """Between steps, before frame f is written."""
 
-    def solution(self, stats: dict[str, Any], march: March | None = None) -> Solution:
+    def solution(self, stats: Stats, march: March | None = None) -> Solution:
         """The run, which has come to its end."""
         return Solution(t=self.times, s=self.problem.chain.s, stats=stats, problem=self.problem, **self.rows)
 
@@ -85,7 +86,7 @@ class Recording(Rows):
     """
 
     def __init__(
-        self, problem: Problem, times: NDArray, path: str | Path, about: dict[str, Any], estimate: dict[str, float] | None = None
+        self, problem: Problem, times: NDArray, path: str | Path, about: Stats, estimate: dict[str, float] | None = None
     ) -> None:
         super().__init__(problem, times)
         self.path, self.about, self.estimate = archive.named(path), about, estimate
@@ -165,7 +166,7 @@ class Recording(Rows):
     def _create(self, found: dict[str, Any]) -> None:
         """Make the file, with room for all frames that are as the one found."""
         self.restart.clear()
-        head = archive.header(self.problem, self.times, self.problem.chain.s, self.about, self.estimate, False)
+        head = schema.header(self.problem, self.times, self.problem.chain.s, self.about, self.estimate, False)
         shapes = {name: np.shape(value) for name, value in found.items()}
         with safe.fresh(self.path, room(head, shapes)) as new:
             FrameFile.create(new.name, head, shapes).__exit__()
@@ -215,7 +216,7 @@ class Recording(Rows):
         if not self.file.same():
             raise OSError(f"{self.path} was deleted or replaced while a run wrote to it, and the run stops; its frames are lost")
 
-    def solution(self, stats: dict[str, Any], march: March | None = None) -> Solution:
+    def solution(self, stats: Stats, march: March | None = None) -> Solution:
         """The run, its file finished, or as it was finished before."""
         assert self.file is not None
         if march is not None:
@@ -242,16 +243,16 @@ class Recording(Rows):
                 raise ValueError(f"{self.path} holds another run, whose {name} differs{words}; give another path, or delete it")
 
 
-def _told(problem: Problem, times: NDArray, stats: dict[str, Any]) -> dict[str, str | bytes]:
+def _told(problem: Problem, times: NDArray, stats: Stats) -> dict[str, str | bytes]:
     """All that makes a run what it is, by name: a hash of each array, the rest as text."""
-    numbers, arrays = archive.describe(problem)
+    numbers, arrays = schema.describe(problem)
     told = {name: stats.get(name) for name in SETTINGS} | numbers
-    return {name: archive.as_text(value) for name, value in told.items()} | {
+    return {name: schema.as_text(value) for name, value in told.items()} | {
         name: hashlib.sha256(np.ascontiguousarray(value).data).digest() for name, value in (arrays | {"frames": times}).items()
     }
 
 
-def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> tuple[Integrator, float, dict[str, Any]] | None:
+def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> tuple[Integrator, float, Stats] | None:
     """Integrator and step of the run in a file, and what is known of its search, for `stats`; None if there is no file.
 
     ValueError if it was made for another tolerance.
@@ -270,7 +271,7 @@ def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> 
         told = f": {stats.get('tol')} there, {tol} here"
         raise ValueError(f"{path} holds another run, whose tol differs{told}; give another path, or delete it")
     try:
-        searched = {name: stats[name] for name in ("tol", "attempts") if name in stats}
+        searched = cast(Stats, {name: stats[name] for name in ("tol", "attempts") if name in stats})
         return from_settings(str(stats["settings"])), checks.number("dt", stats["dt"], positive=True), searched
     except (KeyError, ValueError) as error:
         raise ValueError(f"{path} holds no run that can go on: {error}; give another path, or delete it") from None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import FixedStep, Tally, Work
+from discs.running.stats import Stats
 from discs.skew import Phase
 
 EVERY = 50  # steps, of which one is compared
@@ -109,26 +110,25 @@ def converging(system: RollingDiscs, integrator: FixedStep, before: Any, t: floa
     return h / 2**halving
 
 
-def doubts(stats: dict[str, Any]) -> list[str]:
+def doubts(stats: Stats) -> list[str]:
     """Why a run is not to be trusted, in words, from what it tells of itself."""
     found = []
-    if stats.get("unconverged") and (stuck := _number(stats, "unconverged")):
-        steps = _number(stats, "steps") + _number(stats, "short_steps")
+    if stats.get("unconverged") and (stuck := _number(stats["unconverged"])):
+        steps = _number(stats.get("steps")) + _number(stats.get("short_steps"))
         found.append(f"{stuck} of {steps} steps did not converge")
     error = stats.get("step_error")
     if isinstance(error, float) and error > WARNED:
         off = f"by about {100 * error:.0f} %" if error < 1 else "altogether"
-        found.append(f"dt = {_number(stats, 'dt'):.3g} is too long for this motion, positions or angles may be off {off}")
+        found.append(f"dt = {_number(stats.get('dt')):.3g} is too long for this motion, positions or angles may be off {off}")
     return found
 
 
-def cure(stats: dict[str, Any]) -> str:
+def cure(stats: Stats) -> str:
     """A step that might do, in words: with it the run's steps converge, and err by AIM if errors go like its square."""
     shorter = stats["dt"] * np.sqrt(min(AIM / (stats.get("step_error") or AIM), 1.0))
     return f"dt = {min(shorter, stats.get('converging_dt', np.inf)):.2g}"
 
 
-def _number(stats: dict[str, Any], name: str) -> float:
+def _number(value: object) -> float:
     """What a run tells of itself, 0 where that is no number: a file may hold anything."""
-    value = stats.get(name)
     return value if isinstance(value, int | float) else 0

@@ -12,6 +12,7 @@ from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find
 from discs.integrators.composition import Composition
 from discs.integrators.gauss import Gauss
 from discs.problem import Problem, State
+from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import SimulationError
 from discs.solution import Solution
@@ -255,7 +256,7 @@ def _worst(found: Solution, errors: dict[str, float], bound: dict[str, float]) -
 
 def _told(found: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int) -> Solution:
     """The run with what was found out about it."""
-    told = {"tol": dict(tol) if isinstance(tol, Mapping) else tol, "attempts": attempts}
+    told: Stats = {"tol": dict(tol) if isinstance(tol, Mapping) else tol, "attempts": attempts}
     return replace(found, error_estimate=errors, stats=found.stats | told)
 
 

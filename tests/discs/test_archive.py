@@ -11,7 +11,7 @@ import xarray
 
 from continuum import solve, steered_rod, untwisting_rod
 from discs import Problem, Solution, load, simulate
-from discs.files import archive, framefile
+from discs.files import framefile, schema
 from tests.conftest import ALL, models, uneven
 
 
@@ -26,7 +26,7 @@ def same(a: Solution, b: Solution) -> None:
         elif field.name == "problem":
             assert repr_of(one) == repr_of(other)
         else:
-            assert json.loads(archive.as_text(one)) == other, field.name
+            assert json.loads(schema.as_text(one)) == other, field.name
 
 
 def repr_of(problem: Problem | None) -> str:
@@ -59,7 +59,7 @@ def test_fields_too(scene, tmp_path):
 
 def test_every_quantity_has_unit_and_name(run):
     arrays = {f.name for f in fields(Solution)} - {"t", "s", "stats", "error_estimate", "problem"}
-    assert arrays == set(archive.QUANTITIES)
+    assert arrays == set(schema.QUANTITIES)
     dataset = run.to_xarray()
     assert all(variable.attrs["long_name"] for variable in dataset.variables.values())
     assert dataset.x.dims == ("time", "disc")
@@ -87,7 +87,7 @@ def test_a_dataset_that_xarray_wrote_is_not_trusted(run, tmp_path):
 
 
 def test_large_files_are_mapped(run, saved, monkeypatch):
-    monkeypatch.setattr(archive, "MAPPED", 0)
+    monkeypatch.setattr(framefile, "MAPPED", 0)
     mapped = load(saved)
     assert isinstance(mapped.x, np.memmap)
     same(run, mapped)
@@ -152,7 +152,7 @@ def test_memory_does_not_grow_with_frames(tmp_path):
     """A file of 130 MB, too large to be read whole, through a process that holds far less; a million discs: docs/archives.md."""
     (_, few), (_, many) = (memory(tmp_path / f"{frames}.nc", 20000, frames, "plain") for frames in (2, 202))
     size = (tmp_path / "202.nc").stat().st_size
-    assert size > archive.MAPPED
+    assert size > framefile.MAPPED
     assert many - few < 0.1 * size
 
 

@@ -14,7 +14,7 @@ import pytest
 from discs import load, simulate
 from discs.__main__ import main
 from discs.chains.twist import untwisting_chain
-from discs.files import archive, safe
+from discs.files import safe, schema
 from discs.running import recording
 from tests.conftest import Model, uneven
 from tests.discs.test_archive import same
@@ -244,7 +244,7 @@ def test_archives_of_earlier_versions_open(tmp_path):
 def test_frames_of_earlier_versions_are_gone_on_with(tmp_path, monkeypatch):
     """An archive without room for its stats, and a restart file that does not say whose it is."""
     path = tmp_path / "run.nc"
-    monkeypatch.setattr(archive, "STATS_ROOM", 0)
+    monkeypatch.setattr(schema, "STATS_ROOM", 0)
     stopped_at(monkeypatch, 9, path)
     with np.load(f"{path}.restart") as file:
         kept = {name: file[name] for name in file.files if name != "run"}

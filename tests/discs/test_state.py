@@ -8,7 +8,7 @@ import pytest
 from compare import lump
 from continuum import Rod, free_rod, solve, steered_rod
 from discs import Problem, load, simulate
-from discs.files.archive import QUANTITIES
+from discs.files.schema import QUANTITIES
 from discs.running.time_loop import March
 from tests.conftest import ALL, STEERED, Model, models, uneven
 from tests.discs.test_archive import same

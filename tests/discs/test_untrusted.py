@@ -9,7 +9,7 @@ import xarray
 
 from discs import load, simulate
 from discs.__main__ import main
-from discs.files import archive
+from discs.files import schema
 from tests.conftest import Model, uneven
 from tests.discs.test_archive import repr_of
 
@@ -33,7 +33,7 @@ def test_a_changed_byte_is_never_a_changed_run(run, saved):
         except ValueError:
             noticed += 1
         else:
-            for name in ("t", "s", *archive.QUANTITIES):
+            for name in ("t", "s", *schema.QUANTITIES):
                 assert (getattr(found, name) is None) or getattr(found, name).tobytes() == getattr(run, name).tobytes(), (
                     place,
                     name,
@@ -52,7 +52,7 @@ def without(name):
 
 
 def attribute(name, value):
-    return lambda file: file.attrs.update({name: archive.fixed(value)})
+    return lambda file: file.attrs.update({name: schema.fixed(value)})
 
 
 def elsewhere(file):
@@ -150,7 +150,7 @@ def sparse(file, size, names):
     ("size", "names", "message"),
     [
         (9, ["x", "y", "theta", "omega", "s"], "has the shape"),
-        (9, [*"xys", "theta", "omega", "density", "radius", "spin_inertia", *archive.INITIAL], "s does not increase"),
+        (9, [*"xys", "theta", "omega", "density", "radius", "spin_inertia", *schema.INITIAL], "s does not increase"),
         (7, ["bending_stiffness"], "bending_stiffness has the shape .*, more than one for each of 9 discs"),
         (4, ["time", "checksum", *"xy", "theta", "omega", "energy", "rolling_residual"], "time does not increase"),
     ],

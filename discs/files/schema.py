@@ -1,0 +1,176 @@
+"""What a file of a run says, and how: names, dimensions and units of its variables, a problem as data, header and checksums."""
+
+import json
+import zlib
+from dataclasses import fields
+from platform import python_version
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from discs import checks
+from discs.arrays import Float
+from discs.chains.chain import Chain, SteeredChain
+from discs.problem import Problem, State
+from discs.running.stats import Stats
+
+FORMAT = "rolling-discs run, version 1"
+UNITS = "any consistent system; units name the quantity, as 'length per time'"
+WROTE = 1 << 32  # added to the checksum of a frame that is there, so that it is never zero
+STATS_ROOM = 8192  # bytes; what is kept free for the stats of a run on its way
+CHECKSUM = "CRC-32 of the frame plus 2**32; 0 where it has not been written"
+CHAINS: dict[str, type[Chain] | type[SteeredChain]] = {"Chain": Chain, "SteeredChain": SteeredChain}
+
+
+class Quantity(NamedTuple):
+    """Dimensions after time, unit and meaning of what a frame records."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+QUANTITIES = {
+    "x": Quantity(("disc",), "length", "contact points, first coordinate"),
+    "y": Quantity(("disc",), "length", "contact points, second coordinate"),
+    "theta": Quantity(("disc",), "rad", "roll angles"),
+    "phi": Quantity(("disc",), "rad", "own headings"),
+    "omega": Quantity(("disc",), "rad per time", "rates of roll"),
+    "x_rate": Quantity(("disc",), "length per time", "velocities of the contact points, first coordinate"),
+    "y_rate": Quantity(("disc",), "length per time", "velocities of the contact points, second coordinate"),
+    "phi_rate": Quantity(("disc",), "rad per time", "rates of turning"),
+    "slope_x": Quantity(("disc",), "1", "headings r', first coordinate"),
+    "slope_y": Quantity(("disc",), "1", "headings r', second coordinate"),
+    "contact_force": Quantity(("axis", "disc"), "mass length per time squared", "force of the ground on each disc"),
+    "tension": Quantity(("link",), "mass length per time squared", "tension of the links"),
+    "energy": Quantity((), "mass length squared per time squared", "kinetic and potential energy"),
+    "modified_energy": Quantity((), "mass length squared per time squared", "invariant of the two-step scheme"),
+    "rolling_residual": Quantity((), "length per time", "largest |r. - e omega| over the discs"),
+}
+ROD = {
+    "density": Quantity(("disc",), "mass per length", "rho"),
+    "spin_inertia": Quantity(("disc",), "mass length", "alpha, moment of inertia about the axle per length"),
+    "heading_inertia": Quantity(("disc",), "mass length", "J, moment of inertia about the vertical per length"),
+    "radius": Quantity(("disc",), "length", "R"),
+    "torsion_stiffness": Quantity(("link",), "mass length cubed per time squared", "beta"),
+    "stretch_stiffness": Quantity(("link",), "mass length per time squared", "A"),
+    "shear_stiffness": Quantity(("link",), "mass length per time squared", "G"),
+    "bending_stiffness": Quantity(("bend",), "mass length cubed per time squared", "K"),
+}
+INITIAL = {f"initial_{f.name}": QUANTITIES[f.name]._replace(long_name=f"initial {f.name}") for f in fields(State)}
+PARAMETERS = ROD | INITIAL
+COORDINATES = {
+    "time": Quantity(("time",), "time", "times of the frames"),
+    "s": Quantity(("disc",), "length", "places along the rod"),
+}
+
+
+class Header(NamedTuple):
+    """Everything but the frames.
+
+    Attributes
+    ----------
+    attrs : attributes of the file, text and numbers.
+    static : variables that do not depend on time, and the times.
+    """
+
+    attrs: dict[str, Any]
+    static: dict[str, Float]
+
+
+def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, Float]]:
+    """A problem as numbers and words, and arrays by the names of `PARAMETERS` of what differs from disc to disc."""
+    chain, initial = problem.chain, problem.initial
+    if problem.loads:
+        raise ValueError("a run with loads cannot be written to a file: files do not hold loads")
+    given = {f.name: getattr(chain, f.name) for f in fields(chain)}
+    given |= {f"initial_{f.name}": getattr(initial, f.name) for f in fields(initial)}
+    arrays = {name: value for name, value in given.items() if isinstance(value, np.ndarray)}
+    equal = {name: float(value[0]) for name, value in arrays.items() if (value.view(np.int64) == value.view(np.int64)[0]).all()}
+    told = {name: value for name, value in given.items() if name not in arrays} | equal
+    told = {"chain": type(chain).__name__, **told, "duration": problem.duration}
+    return told, {name: value for name, value in arrays.items() if name not in equal}
+
+
+def rebuild(told: dict[str, Any], arrays: dict[str, Float]) -> Problem:
+    """The problem of `describe`; whatever does not make one is refused by it with a ValueError."""
+    given = told | arrays
+    kind = CHAINS[checks.choice("chain", given.pop("chain", None), CHAINS)]
+    duration, n = given.pop("duration", None), checks.whole("n", given.get("n"), 1)
+    state: dict[str, Any] = {name.removeprefix("initial_"): given.pop(name) for name in INITIAL if name in given}
+    chain = kind(**given)
+    full: dict[str, Any] = {name: None if value is None else np.broadcast_to(value, n) for name, value in state.items()}
+    return Problem(chain, State(**full), duration)
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a run depends on."""
+    from importlib.metadata import PackageNotFoundError, version  # slow to import
+
+    found = {"python": python_version()}
+    for name in ("rolling-discs", "numpy", "scipy", "numba"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def header(
+    problem: Problem | None, times: Float, s: Float, stats: Stats, estimate: dict[str, float] | None, complete: bool
+) -> Header:
+    """The header of a file."""
+    told, arrays = describe(problem) if problem is not None else (None, {})
+    static = {"time": times, "s": s} | arrays
+    attrs: dict[str, Any] = {
+        "format": FORMAT,
+        "title": f"a rod on {s.size} nodes" if "scene" in stats else f"{s.size} rolling discs",
+        "unit_system": UNITS,
+        "problem": as_text(told),
+        "method": str(stats.get("method")),
+        "stats": as_text(stats).ljust(0 if complete else STATS_ROOM),  # blanks, which JSON allows, are room for more
+        "error_estimate": as_text(estimate),
+        "versions": as_text(versions()),
+        # the one random thing: where the search for the stiffest mode starts
+        "seeds": as_text({"suggest_dt": 0} if stats.get("dt_suggested") else {}),
+        "complete": int(complete),
+    }
+    return Header(attrs | {"checksum": header_checksum(attrs, static)}, static)
+
+
+def header_checksum(attrs: dict[str, Any], static: dict[str, Float]) -> int:
+    """Of the problem, the times and the places."""
+    total = zlib.crc32(attrs["problem"].encode())
+    for name in sorted(static):
+        total = zlib.crc32(np.ascontiguousarray(static[name]).data, total)
+    return total
+
+
+def frame_checksum(rows: dict[str, Float]) -> int:
+    """Of what one frame records, by name; never zero."""
+    total = 0
+    for name in sorted(rows):
+        total = zlib.crc32(np.ascontiguousarray(rows[name]).data, total)
+    return total + WROTE
+
+
+def as_text(value: Any) -> str:
+    """JSON; numbers of NumPy become Python's."""
+    return json.dumps(value, default=lambda number: number.tolist())
+
+
+def fixed(value: Any) -> Any:
+    """A text as one of fixed length, which HDF5 keeps in the header itself."""
+    return np.bytes_(value.encode()) if isinstance(value, str) else value
+
+
+def attributes(name: str, dims: tuple[str, ...]) -> dict[str, str]:
+    """Unit, meaning and place of a variable."""
+    meaning = (QUANTITIES | PARAMETERS | COORDINATES)[name]
+    place = {"coordinates": "s"} if "disc" in dims and name != "s" else {}
+    return {"units": meaning.units, "long_name": meaning.long_name} | place
+
+
+def dimensions(name: str) -> tuple[str, ...]:
+    """Dimensions of a variable."""
+    return ("time", *QUANTITIES[name].dims) if name in QUANTITIES else (PARAMETERS | COORDINATES)[name].dims
