@@ -13,7 +13,8 @@ from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
 from compare.results import WorkPrecision
 from compare.sweeps import read
-from compare.trust import Trust, gathered, trust
+from compare.trust import gathered, trust
+from compare.trust_table import Trust
 from continuum import Scene, steered_rod, untwisting_rod
 from continuum.files import read_scene
 from discs import command_line

@@ -10,7 +10,8 @@ import pytest
 from compare import trust as module
 from compare.__main__ import main
 from compare.random_scenes import KINDS, PARAMETERS, random_scene
-from compare.trust import LEAST, MOST, Row, Trust, at_most, examine, trust
+from compare.trust import at_most, examine, trust
+from compare.trust_table import LEAST, MOST, Row, Trust
 
 SAMPLE = (5, 7, 10, 14)  # own headings, both laws, free and closed; chosen for their time only
 

@@ -1,0 +1,123 @@
+"""Whether tolerances are kept, in one table: see `compare.trust`."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import shorten
+from typing import NamedTuple
+
+import numpy as np
+
+from compare.sweeps import Result
+
+OUTCOMES = ("within", "ABOVE", "refused", "cut off", "no reference")
+LEAST = 5.0  # a reference errs by at most the tolerance over this
+MOST = 20.0  # times its error an estimate may be
+
+
+class Row(NamedTuple):
+    """A scene by `solve` or `simulate`.
+
+    scene : seed and index. kind, law, words, duration : of the scene; words of its initial fields. by : "solve" or "simulate".
+    tol : asked for; of fields absolute, of discs relative to the largest value of each. outcome : one of OUTCOMES.
+    error, estimate : largest over positions and angles, as tol counts them; NaN where unknown. ratio : estimate over error, NaN
+    where the error is too small to be known. seconds : processor time. reference, reference_error : what it is held against.
+    unlike : by how many times their own error chains differ from the finer field. says : the refusal's words, or warnings.
+    shown : of a refusal, what chains do.
+    """
+
+    scene: str
+    kind: str
+    law: str
+    words: str
+    duration: float
+    by: str
+    tol: float
+    outcome: str
+    error: float = np.nan
+    estimate: float = np.nan
+    ratio: float = np.nan
+    seconds: float = np.nan
+    reference: str = ""
+    reference_error: float = np.nan
+    unlike: float = np.nan
+    says: str = ""
+    shown: str = ""
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What was found. rows : two for each scene. failed : cases that broke, as a sweep tells them."""
+
+    rows: list[Row]
+    failed: list[Result]
+
+    def of(self, by: str) -> list[Row]:
+        """The rows of "solve" or "simulate"."""
+        return [row for row in self.rows if row.by == by]
+
+    def table(self) -> str:
+        """All rows, in Markdown, refusals with their words."""
+        head = (
+            "scene",
+            "kind",
+            "law",
+            "initial fields",
+            "t",
+            "by",
+            "tol",
+            "outcome",
+            "error",
+            "estimate",
+            "ratio",
+            "s",
+            "reference",
+        )
+        lines = ["| " + " | ".join(head) + " | says |", "| --- " * (len(head) + 1) + "|"]
+        for r in self.rows:
+            numbers = [_shown(v) for v in (r.error, r.estimate)]
+            ratio = f"{r.ratio:.2g}" if np.isfinite(r.ratio) else "–"
+            reference = f"{r.reference} {r.reference_error:.0e}" if r.reference else "–"
+            says = shorten("; ".join(filter(None, [r.says, r.shown])), 300).replace("|", "\\|")
+            cells = (r.scene, r.kind, r.law, r.words.replace("|", "\\|"), f"{r.duration:.3g}", r.by, f"{r.tol:.1e}", r.outcome)
+            lines.append("| " + " | ".join([*cells, *numbers, ratio, f"{r.seconds:.2g}", reference, says]) + " |")
+        return "\n".join(lines)
+
+    def summary(self) -> str:
+        """Counts, the quantiles of estimate over error, and what is above its tolerance, as a table in Markdown."""
+        head = ("", *OUTCOMES, "estimate/error: least", "median", "90 %", "largest", "tol/error: median", "s: median", "largest")
+        lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
+        for by in ("solve", "simulate"):
+            rows = self.of(by)
+            counts = [str(sum(r.outcome == outcome for r in rows)) for outcome in OUTCOMES]
+            ratios = np.array([r.ratio for r in rows if np.isfinite(r.ratio)] or [np.nan])
+            spare = np.array([r.tol / r.error for r in rows if r.error > 0] or [np.nan])
+            seconds = np.array([r.seconds for r in rows] or [np.nan])
+            quantiles = [f"{np.quantile(ratios, p):.2g}" for p in (0.0, 0.5, 0.9, 1.0)]
+            cells = [by, *counts, *quantiles, f"{np.median(spare):.2g}", f"{np.median(seconds):.2g}", f"{seconds.max():.2g}"]
+            lines.append("| " + " | ".join(cells) + " |")
+        kinds = {r.reference for r in self.rows if r.reference}
+        lines.append("\nReferences: " + ", ".join(f"{k} {sum(r.reference == k for r in self.rows)}" for k in sorted(kinds)) + ".")
+        for r in self.rows:
+            if r.outcome == "ABOVE":
+                lines.append(f"* above: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}, error {r.error:.1e}")
+            if r.ratio > MOST:
+                words = f"estimate over error {r.ratio:.0f}, tolerance over estimate {r.tol / r.estimate:.2g}"
+                lines.append(f"* cautious: {r.scene} ({r.kind}, {r.law}, {r.by}), {words}")
+            if r.unlike > LEAST:
+                lines.append(f"* unlike the chains: {r.scene} ({r.kind}, {r.law}), by {r.unlike:.0f} times what they err")
+            if r.outcome == "refused":
+                lines.append(f"* refused: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}: {r.says} [{r.shown}]")
+        lines += [f"* broken: {r.case}: {r.error}" for r in self.failed]
+        return "\n".join(lines)
+
+    def save(self, path: str | Path) -> None:
+        """All rows, as CSV."""
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(Row._fields)
+            writer.writerows(self.rows)
+
+
+def _shown(value: float) -> str:
+    return f"{value:.1e}" if np.isfinite(value) else "–"
