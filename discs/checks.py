@@ -1,7 +1,7 @@
-"""Refusing bad input: what is required, what was given, what to do.
+"""Checks of input; each error says what is required and what was given.
 
-Numbers are finite and real: ints, floats, fractions, decimals, NumPy's, and arrays of them. What merely can be turned into a number
-is none: truth values, texts, dates and times, complex numbers, even with an imaginary part of 0, and arrays with masked entries.
+Numbers are finite and real: ints, floats, fractions, decimals, NumPy's numbers, and arrays of them. Truth values, text, dates,
+times, complex numbers (even with imaginary part 0) and arrays with masked entries are refused, although NumPy could convert them.
 """
 
 import math
@@ -20,7 +20,7 @@ TEXTS = (str, bytes, bytearray, memoryview)
 
 
 class _Short(reprlib.Repr):
-    """What was given, in few words however large it is."""
+    """A short text for a value of any size."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -42,7 +42,7 @@ _SHORT = _Short()
 
 
 def shown(value: object) -> str:
-    """What was given, in one short line however large it is."""
+    """One short line for a value of any size."""
     return " ".join(_SHORT.repr(value).split())
 
 
@@ -61,7 +61,7 @@ def whole(name: str, value: object, least: int | None = None, why: str = "") -> 
         need = "" if least is None else f" of at least {least}"
         raise ValueError(f"{name} must be a whole number{need}{f' ({why})' * bool(why)}; got {shown(value)}")
     if abs(given) > MOST:
-        raise ValueError(f"{name} must be at most 2**53 in size, more than a computer can hold or count; got {shown(value)}")
+        raise ValueError(f"{name} must be at most 2**53 in size; got {shown(value)}")
     return int(given)
 
 
@@ -75,7 +75,7 @@ def number(name: str, value: object, *, positive: bool = False) -> float:
 
 
 def array(name: str, value: ArrayLike, need: str = "finite numbers") -> Float:
-    """Return `value` as a new float array, entries may be infinite or NaN; else raise ValueError that names what is needed."""
+    """Return `value` as a new float array, entries may be infinite or NaN; else raise ValueError that says what is needed."""
     given = _doubles(value)
     if isinstance(given, str):
         raise ValueError(f"{name} must be {need}; got {shown(value)}{f' ({given})' * bool(given)}")
@@ -83,7 +83,7 @@ def array(name: str, value: ArrayLike, need: str = "finite numbers") -> Float:
 
 
 def field(name: str, value: ArrayLike, size: int, *, least: float | None = None, strict: bool = False) -> Float:
-    """Return `value` as a read-only float array (size,), a number standing for all of them and stored once.
+    """Return `value` as a read-only float array (size,), a single number being repeated but stored once.
 
     With `least`, every entry must be at least that, or larger if `strict`.
     """
@@ -148,13 +148,13 @@ def _index(value: Any) -> int | None:
 
 
 def _doubles(value: ArrayLike) -> Float | str:
-    """A new float array of what is given, or why it is none, as far as that can be said."""
+    """`value` as a new float array, or the reason why it is none ("" if it is obvious)."""
     if isinstance(value, TEXTS):
         return ""
     try:
         if _masked(value):
             return "with masked entries: fill or leave them out"
-        # entries of lists are looked at one by one: NumPy would take a truth value among numbers for a number
+        # entries of lists are checked one by one: NumPy would convert a truth value among numbers to a number
         given = np.asarray(value) if hasattr(value, "dtype") or hasattr(value, "__array__") else np.array(value, dtype=object)
     except (TypeError, ValueError):
         return ""
@@ -176,12 +176,12 @@ def _doubles(value: ArrayLike) -> Float | str:
 KINDS = {"b": "truth values", "c": "complex numbers", "M": "dates", "m": "times", "U": "text", "S": "text"}
 
 
-def _masked(value: Any) -> bool:
+def _masked(value: object) -> bool:
     return bool(np.ma.is_masked(value)) or (isinstance(value, (list, tuple)) and any(map(_masked, value)))
 
 
-def _odd(entry: Any) -> str | None:
-    """Why an entry is no number, "" if that goes without saying; None if it is one."""
+def _odd(entry: object) -> str | None:
+    """The reason why an entry is no number ("" if it is obvious); None if it is one."""
     if isinstance(entry, (float, int)) and not isinstance(entry, bool):
         return None
     if hasattr(entry, "dtype"):

@@ -1,10 +1,9 @@
-"""What the command lines of the packages share: options of a run, what is said about a file, exit codes."""
+"""Shared parts of the command lines: options of a run, descriptions of files, exit codes."""
 
 import argparse
 import sys
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -40,7 +39,7 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"auto, {', '.join(METHODS)} (default: auto; midpoint with --dt)",
     )
-    p.add_argument("--dt", metavar="DT", type=float, help="time step, time (default: suggested for the method, and said)")
+    p.add_argument("--dt", metavar="DT", type=float, help="time step, time (default: suggested for the method, and printed)")
     p.add_argument(
         "--tol",
         metavar="TOL",
@@ -51,18 +50,18 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--want", metavar="NAME", nargs="+", default=[], help=f"record also {', '.join((*WANTS, *OFFERS))} (default: none)"
     )
-    p.add_argument("--engine", choices=ENGINES, default="compiled", help="kernels or NumPy and SciPy (default: compiled)")
+    p.add_argument("--engine", choices=ENGINES, default="compiled", help="compiled kernels, or NumPy and SciPy (default: compiled)")
     add_saving(p)
 
 
 def add_saving(p: argparse.ArgumentParser) -> None:
-    """Options of what is written."""
+    """Options for saving."""
     p.add_argument("--save", metavar="FILE", help="NetCDF file for the run (default: not saved)")
     p.add_argument("--overwrite", action="store_true", help="replace FILE if there is another run in it (default: refuse)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
-def add_file_commands(commands: Any) -> None:
+def add_file_commands(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """The commands that read a file."""
     p = commands.add_parser("info", help="say what is in a file", description="Say what is in a file.")
     p.add_argument("file", metavar="FILE", help="a saved run")
@@ -83,22 +82,26 @@ def add_file_commands(commands: Any) -> None:
 
 
 def run_discs(problem: Problem, options: argparse.Namespace) -> None:
-    """Run a problem as the options say, and say what came out."""
-    settled: dict[str, Any] = {
-        "frames": options.frames,
-        "want": options.want,
-        "engine": options.engine,
-        "progress": not options.quiet,
-    }
+    """Run a problem with the given options and print a summary."""
     clear_way(options, whole=False)
-    run = simulate(problem, options.method, options.dt, tol=options.tol, checkpoint=options.save, **settled)
+    run = simulate(
+        problem,
+        options.method,
+        options.dt,
+        tol=options.tol,
+        frames=options.frames,
+        want=options.want,
+        engine=options.engine,
+        progress=not options.quiet,
+        checkpoint=options.save,
+    )
     print(summary(run))
     if options.save:
         print(f"written to {options.save}")
 
 
 def clear_way(options: argparse.Namespace, whole: bool) -> None:
-    """See that a run can be saved before it is computed; one that is not saved `whole` at the end may go on from its file."""
+    """Check before a run that its file can be written; a run that is not saved `whole` at its end may continue from its file."""
     if options.overwrite and not options.save:
         raise ValueError("--overwrite goes with --save FILE")
     if not options.save:
@@ -106,17 +109,17 @@ def clear_way(options: argparse.Namespace, whole: bool) -> None:
     path = named(options.save)
     check_writable(path)
     if path.exists() and options.overwrite:
-        with FrameFile.open(path):  # nothing but a run is ever deleted
+        with FrameFile.open(path):  # only a run is ever deleted
             pass
         with replacing(path) as real:
-            if not whole:  # otherwise the new run takes the place of the old one at its end
+            if not whole:  # otherwise the new run replaces the old one at its end
                 real.unlink()
     elif path.exists() and whole:
         raise ValueError(f"{path} exists; give --overwrite to replace it")
 
 
 def summary(run: Solution) -> str:
-    """What came out, in a few lines."""
+    """A summary of a run in a few lines."""
     stats, drift = run.stats, np.abs(run.energy - run.energy[0]).max()
     what = f"field of the {printable(stats['scene']['name'])} on {run.s.size} nodes" if is_field(run) else f"{run.s.size} discs"
     lines = [f"{what}, {run.t.size} frames, t = {run.t[0]:g} to {run.t[-1]:g}"]
@@ -137,12 +140,12 @@ def summary(run: Solution) -> str:
 
 
 def is_field(run: Solution) -> bool:
-    """Whether a run is a field, which says its scene."""
+    """Whether a run is a field, whose stats contain its scene."""
     return isinstance(run.stats.get("scene"), dict)
 
 
 def about(path: str | Path) -> str:
-    """What is in a file: the run, its parameters, what it was made with."""
+    """Description of a file: the run, its parameters, the versions it was made with."""
     run, told = load(path), []
     if is_field(run):
         told = [f"{printable(name)} = {printable(value)}" for name, value in run.stats["scene"].items()]
@@ -172,7 +175,7 @@ def draw(options: argparse.Namespace) -> None:
 
 
 def failed(error: object, code: int) -> int:
-    """Say what was wrong, in one line; names and texts of files may be in it."""
+    """Print an error in one line; text from files is escaped."""
     print(f"error: {printable(error)}", file=sys.stderr)
     return code
 

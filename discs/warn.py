@@ -1,9 +1,9 @@
-"""Warnings that name the line of the user's program, whichever of our functions found the reason."""
+"""Warnings that point to a line of the user's program, not to one of these packages."""
 
 import sys
 import warnings
 
-OURS = ("discs", "continuum", "compare", "importlib")  # importlib: of a module that is imported when it is needed
+OURS = ("discs", "continuum", "compare", "importlib")  # importlib: of a module that is imported only when needed
 
 
 def warn(message: str) -> None:

@@ -1,7 +1,7 @@
-"""Runs as files: NetCDF-4 that opens in plain xarray, written whole or not at all, read without trusting it.
+"""Runs as NetCDF-4 files: readable by plain xarray, written completely or not at all, checked when read.
 
-A file holds one variable for each quantity of a `Solution` over the dimensions (time, disc), what was computed as JSON in its
-attributes (parameters that differ from disc to disc as variables), and a checksum of each frame. Nothing in a file is executed.
+A file contains one variable for each quantity of a `Solution` over the dimensions (time, disc), the problem as JSON in its
+attributes (parameters that differ between discs as variables), and a checksum of each frame. Nothing in a file is executed.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ SUFFIXES = (".nc", ".nc4", ".h5", ".hdf5")  # of NetCDF-4, which is HDF5
 
 
 def recorded(run: Solution) -> dict[str, Float]:
-    """What the frames of a run hold, by name."""
+    """The recorded arrays of a run, by name."""
     return {name: np.asarray(value) for name in QUANTITIES if (value := getattr(run, name)) is not None}
 
 
@@ -45,7 +45,7 @@ def to_xarray(run: Solution) -> "xarray.Dataset":
 
 
 def named(path: str | Path) -> Path:
-    """The file of a run that a path names, links followed; ValueError for another ending or where no file can be."""
+    """The file of a run at a path, links resolved; ValueError for another ending or if no file can be there."""
     real = safe.target(path)
     if Path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"{path} would be a NetCDF-4 file: its name must end in {', '.join(SUFFIXES)}")
@@ -53,18 +53,18 @@ def named(path: str | Path) -> Path:
 
 
 def restart_of(path: Path) -> Path:
-    """The restart file of a run on its way into the file at `path`; who writes that file holds this one."""
+    """The restart file of an unfinished run at `path`; the process that writes the run holds its lock."""
     return path.with_name(path.name + ".restart")
 
 
 def busy(path: str | Path) -> ValueError:
-    """What is raised where another run has the file."""
+    """The error if another run writes the file."""
     return ValueError(f"{path} is being written by another run: wait for its end, or give another path")
 
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """The real file at a path that is about to be replaced or deleted; what a run that was interrupted has left beside it goes too.
+    """The real file at a path, to be replaced or deleted; the restart file of an interrupted run is removed too.
 
     ValueError if a run writes to it.
     """
@@ -86,7 +86,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 
 def save(run: Solution, path: str | Path) -> None:
-    """Write a run; the file at `path` is the old one or the new one, never half of it.
+    """Write a run. At any time the file at `path` is the complete old or the complete new one.
 
     Raises
     ------
@@ -104,8 +104,8 @@ def save(run: Solution, path: str | Path) -> None:
 def load(path: str | Path) -> Solution:
     """Read a run.
 
-    Of a run that was interrupted or killed come the frames that were finished, and stats["frames_missing"] says how many are not
-    there. Arrays of files above 64 MiB are mapped from the file (changes stay in memory).
+    For a run that was interrupted or killed, the solution has the finished frames, and stats["frames_missing"] is the number of the
+    others. Arrays of files above 64 MiB are mapped from the file (changes stay in memory).
 
     Raises
     ------

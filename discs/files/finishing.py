@@ -1,7 +1,7 @@
-"""The end of a run into a file: it is said in the file itself, at the places where it stands, so that no room is needed for it.
+"""Completing the file of a run: its attributes are changed in place, so that no further space is needed.
 
-HDF5 does that by some writes, and a process that is killed between them leaves a file that HDF5 refuses. So what the file is beside
-its variables, some kilobytes, is kept in the restart file before, and put back by the run that goes on.
+HDF5 does this in several writes, and a process that is killed between them leaves a file that HDF5 refuses. Therefore all bytes
+outside the variables, some kilobytes, are first copied to the restart file; a run that continues restores them.
 """
 
 import os
@@ -16,7 +16,7 @@ from discs.running.stats import Stats
 
 
 def outside(file: FrameFile) -> dict[str, Float]:
-    """What of a file is no variable: "bytes" (m,), and "ends" (k, 2), where its pieces begin and end, the last with the file."""
+    """The bytes of a file outside its variables: "bytes" (m,), and "ends" (k, 2), begin and end of each piece."""
     taken = sorted((offset, offset + 8 * int(np.prod(shape, dtype=int))) for offset, shape in file.places.values())
     begins, ends = [0, *(end for _, end in taken)], [*(begin for begin, _ in taken), file.size]
     data = b"".join(file.read_bytes(a, b - a) for a, b in zip(begins, ends, strict=True))
@@ -24,7 +24,7 @@ def outside(file: FrameFile) -> dict[str, Float]:
 
 
 def put_back(path: Path, kept: dict[str, Float]) -> None:
-    """Make a file again what it was when `outside` gave `kept`; its variables have not changed since."""
+    """Restore a file to its state when `outside` returned `kept`; its variables have not changed since."""
     fd, data, place = safe.opened(path, os.O_RDWR), kept["bytes"].tobytes(), 0
     try:
         for a, b in kept["ends"].tolist():
@@ -37,7 +37,7 @@ def put_back(path: Path, kept: dict[str, Float]) -> None:
 
 
 def finish(file: FrameFile, stats: Stats) -> None:
-    """Say in a file that it is complete, and its stats."""
+    """Mark a file as complete and write its stats."""
     import h5py
 
     text = schema.as_text(stats)

@@ -1,8 +1,8 @@
 """The file of a run on disc: a NetCDF-4 file of fixed size whose frames are written in place.
 
-All variables are contiguous and have their room from the start, so the file is whole before the first frame is written, and a
-frame is written by the operating system at a known place, past the HDF5 library: nothing that kills the process can harm the file.
-A frame's checksum is written last; until then the frame does not count.
+All variables are contiguous and allocated from the start, so the file is valid before the first frame is written. A frame is
+written at a known offset without the HDF5 library, so a process that is killed cannot damage the file. A frame's checksum is
+written last; until then the frame does not count.
 """
 
 import os
@@ -20,14 +20,14 @@ from discs.problem import Problem
 from discs.solution import Solution
 
 NUMBER, COUNT = np.dtype("<f8"), np.dtype("<i8")
-MAPPED = 64 * 2**20  # bytes; arrays of larger files are mapped, not read
+MAPPED = 64 * 2**20  # bytes; arrays of larger files are memory-mapped, not read
 PART = 2**24  # bytes that are read at once
 DAMAGE = (OSError, KeyError, TypeError, RuntimeError, ValueError, AttributeError, RecursionError, OverflowError)
 NEEDED = ("time", "s", "checksum", "x", "y", "theta", "omega", "energy")
 
 
 def room(head: Header, shapes: dict[str, tuple[int, ...]]) -> int:
-    """Bytes of a file with this header whose frames have the `shapes`; at least, and nearly all of it."""
+    """Bytes of a file with this header and frames of the given `shapes`: a lower bound, nearly exact."""
     frame = sum(int(np.prod(shape, dtype=int)) for shape in shapes.values())
     return 8 * (head.static["time"].size * (frame + 1) + sum(value.size for value in head.static.values()))
 
@@ -38,9 +38,9 @@ class FrameFile:
     Attributes
     ----------
     path : where it is.
-    attrs : its attributes, checked, JSON as what it says.
-    frames : how many there is room for.
-    places : where each variable begins in the file, bytes, and its shape.
+    attrs : its checked attributes, JSON decoded.
+    frames : number of frames that the file has space for.
+    places : offset of each variable in the file, bytes, and its shape.
     size : of the file, bytes.
     """
 
@@ -52,7 +52,7 @@ class FrameFile:
             self.places = self._find()
             self._check_shapes()
             self.frames = self.places["time"][1][0]
-            # the two that must increase tell whether the sizes are true before anything else is read
+            # these two must increase, so that wrong sizes are detected before anything else is read
             self.static = {name: self._increasing(name) for name in COORDINATES}
             self.static |= {name: self._read(name) for name in self.places if name in PARAMETERS}
             self._check_header()
@@ -62,7 +62,7 @@ class FrameFile:
 
     @classmethod
     def create(cls, path: str | Path, header: Header, shapes: dict[str, tuple[int, ...]]) -> "FrameFile":
-        """A new file with room for all frames, what one of them records having the `shapes`."""
+        """A new file with space for all frames; `shapes` are those of the arrays of one frame."""
         import h5netcdf
 
         attrs, static = header
@@ -86,7 +86,7 @@ class FrameFile:
 
     @classmethod
     def open(cls, path: str | Path, writable: bool = False) -> "FrameFile":
-        """An existing file; ValueError if it cannot be read or is not whole."""
+        """An existing file; ValueError if it cannot be read or is damaged."""
         return cls(path, writable)
 
     def __enter__(self) -> "FrameFile":
@@ -97,7 +97,7 @@ class FrameFile:
 
     @cached_property
     def problem(self) -> Problem | None:
-        """The problem, made again from what the file says of it."""
+        """The problem, rebuilt from the file; None if the file has none."""
         told = self.attrs["problem"]
         try:
             if told is None:
@@ -127,16 +127,16 @@ class FrameFile:
         self._write("checksum", f, np.array(schema.frame_checksum(data), COUNT))
 
     def flush(self) -> None:
-        """Have everything on the disc, in case the power fails."""
+        """Flush everything to the disc, in case the power fails."""
         os.fsync(self._fd)
 
     @property
     def recorded(self) -> list[str]:
-        """Names of what a frame records."""
+        """Names of the recorded quantities."""
         return [name for name in QUANTITIES if name in self.places]
 
     def whole(self, most: int | None = None) -> int:
-        """How many frames from the first on are there, of at most so many."""
+        """Number of valid frames from the first on, at most `most`."""
         marks, most = self._read("checksum"), self.frames if most is None else most
         for f in range(most):
             if marks[f] == 0 or schema.frame_checksum({name: self._read(name, f) for name in self.recorded}) != marks[f]:
@@ -144,7 +144,7 @@ class FrameFile:
         return most
 
     def solution(self, problem: Problem | None = None) -> Solution:
-        """The frames that are there; ValueError if there are none, or too few in a complete file. A known `problem` is not read."""
+        """The valid frames; ValueError if there are none, or too few in a complete file. The problem is read unless given."""
         count, missing = self.whole(), {}
         if count < self.frames:
             if self.attrs["complete"]:
@@ -185,7 +185,7 @@ class FrameFile:
         return data
 
     def _increasing(self, name: str) -> Float:
-        """A variable whose numbers increase, read in parts, so that a file is refused early that is large and says nothing."""
+        """A variable whose numbers increase, read in parts so that a large wrong file is refused early."""
         offset, (size,) = self.places[name]
         parts = [np.empty(0)]
         for first in range(0, size, PART // 8):
@@ -209,7 +209,7 @@ class FrameFile:
     # What is in the file
 
     def _find(self) -> dict[str, tuple[int, tuple[int, ...]]]:
-        """Place in the file and shape of each variable; sets `attrs`. HDF5 is asked for names, shapes, places and attributes."""
+        """Place in the file and shape of each variable; sets `attrs`. HDF5 reads only names, shapes, places and attributes."""
         import h5py
 
         places = {}
@@ -231,8 +231,8 @@ class FrameFile:
         return places
 
     def _attribute(self, file: Any, name: str) -> str | int:
-        """An attribute that is a text of fixed length or a whole number. What it is is asked before it is read: in a changed file
-        texts of any length, which stand in a heap, can keep HDF5 busy for ever."""
+        """An attribute that is a text of fixed length or a whole number. Its type is checked before it is read: in a changed file,
+        text of variable length, which HDF5 stores in a heap, can make HDF5 loop for ever."""
         kind = file.attrs.get_id(name)
         if kind.shape not in ((), (1,)) or kind.dtype.kind not in "Si" or kind.dtype.itemsize > untrusted.LONGEST:
             raise ValueError(f"attribute {name!r} is not a text of fixed length or a whole number")
@@ -240,7 +240,7 @@ class FrameFile:
         return value.decode() if isinstance(value, bytes) else value
 
     def _check_shapes(self) -> None:
-        """Check the shapes of the variables: by them it is known what is to be read."""
+        """Check the shapes of the variables, before any is read."""
         for name in NEEDED:
             if name not in self.places:
                 raise ValueError(f"{name} is missing")
@@ -254,7 +254,7 @@ class FrameFile:
                 raise ValueError(f"{name} has the shape {shape}, more than one for each of {sizes['disc'][0]} discs")
 
     def _check_header(self) -> None:
-        """Check what the header says; sets `attrs` to it."""
+        """Check the header and decode its JSON in `attrs`."""
         if schema.header_checksum(self.attrs, self.static) != self.attrs["checksum"]:
             raise ValueError("parameters, times or places are not what was written")
         self.attrs |= {name: untrusted.told(name, self.attrs[name]) for name in untrusted.TEXTS}

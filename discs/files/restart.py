@@ -1,4 +1,4 @@
-"""The restart file beside the file of a run: what the integrator remembers, whose it is, and the lock of who writes."""
+"""The restart file beside the file of a run: the integrator's state, its run, and the lock of the process that writes."""
 
 import os
 import zipfile
@@ -16,13 +16,13 @@ FROM_THE_BEGINNING = "without it the run starts from the beginning, so delete it
 
 
 class Restart:
-    """The restart file of the run at `path`; empty until something is kept, there as long as the run is.
+    """The restart file of the run at `path`; empty until a state is kept, removed when the run is complete.
 
     Attributes
     ----------
     path : of the restart file.
-    kept : what it says, by name.
-    held : whether this process has the lock; who has it may write the file of the run.
+    kept : its content, by name.
+    held : whether this process has the lock and so may write the file of the run.
     """
 
     def __init__(self, path: Path) -> None:
@@ -35,20 +35,20 @@ class Restart:
         return self._fd is not None
 
     def take(self) -> None:
-        """Lock the file and read it. ValueError if another process has it, or it is damaged, or none can be made for a new run."""
+        """Lock the file and read it. ValueError if another process has it, it is damaged, or none can be made for a new run."""
         try:
             self._fd = safe.hold(self.path)
         except BlockingIOError:
             raise archive.busy(self.run) from None
         except OSError as error:
-            if not self.run.exists():  # a run that is there can be read all the same
+            if not self.run.exists():  # an existing run can still be read
                 raise ValueError(f"{self.run} cannot be written: {error.strerror}") from None
             return
         if os.fstat(self._fd).st_size:
             self.kept = read_restart(self.path)
 
     def opened(self) -> FrameFile:
-        """The file of the run, as it was before if a kill has torn its end."""
+        """The file of the run, restored first if its process was killed while completing it."""
         try:
             return FrameFile.open(self.run, writable=self.held)
         except ValueError:
@@ -59,7 +59,7 @@ class Restart:
         return FrameFile.open(self.run, writable=True)
 
     def keep(self, content: dict[str, Any]) -> None:
-        """Replace the file; the lock goes on with the new one."""
+        """Replace the content; the lock passes to the new file."""
         assert self._fd is not None
         with safe.fresh(self.path) as new:
             np.savez(new, **content)
@@ -68,19 +68,19 @@ class Restart:
         self._fd = held
 
     def clear(self) -> None:
-        """Empty the file, which is of a run that is no more."""
+        """Empty the file, whose run no longer exists."""
         assert self._fd is not None
         os.ftruncate(self._fd, 0)
         self.kept = {}
 
     def close(self, done: bool = False) -> None:
-        """Give the lock back; of a run that is done, or has kept nothing, no file is left."""
+        """Release the lock; remove the file if the run is done or nothing was kept."""
         if self._fd is not None:
             safe.release(self._fd, self.path if done or not os.fstat(self._fd).st_size else None)
 
 
 def read_restart(path: Path) -> dict[str, Any]:
-    """What a restart file says, arrays by name; ValueError if it is damaged."""
+    """The arrays of a restart file, by name; ValueError if it is damaged."""
     try:
         with open(safe.opened(path), "rb") as file, np.load(file, allow_pickle=False) as kept:
             return {name: kept[name] for name in kept.files}

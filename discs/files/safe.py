@@ -1,7 +1,7 @@
-"""Files that are written whole or not at all, that one process at a time writes, and that are opened without being trusted.
+"""Files that are written completely or not at all, by one process at a time, and opened without trust.
 
-A new file is written under another name in the same folder, brought to the disc, and renamed; then the folder is brought to the
-disc too. Its writer holds a lock on it, by which what a killed process has left is told from what another one writes, and removed.
+A new file is written under a temporary name in the same folder, flushed to the disc, and renamed; then the folder is flushed too.
+Its writer holds a lock on it. A temporary file without a lock was left by a killed process and is removed.
 """
 
 import errno
@@ -17,16 +17,16 @@ from typing import IO
 
 try:
     import fcntl
-except ImportError:  # not on Windows: nothing is locked there
+except ImportError:  # Windows has none: nothing is locked there
     fcntl = None  # type: ignore[assignment]
 
-PARTIAL = ".discs-partial-"  # how names of files begin that are not finished
+PARTIAL = ".discs-partial-"  # prefix of temporary files
 BUSY = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def target(path: str | Path) -> Path:
-    """The file that a path names, links followed; ValueError where there is something else than a file."""
+    """The file at a path, links resolved; ValueError if something other than a file is there."""
     try:
         real = Path(os.path.realpath(path))
         mode = real.lstat().st_mode
@@ -50,7 +50,7 @@ def check_writable(path: str | Path) -> None:
 
 
 def opened(path: str | Path, flags: int = os.O_RDONLY) -> int:
-    """Descriptor of a regular file; ValueError at once where there is none, or something that would have to be waited for."""
+    """Descriptor of a regular file; ValueError if there is none, or something that could block, as a FIFO."""
     try:
         fd = os.open(path, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         if stat.S_ISREG(os.fstat(fd).st_mode):
@@ -64,10 +64,10 @@ def opened(path: str | Path, flags: int = os.O_RDONLY) -> int:
 
 @contextmanager
 def fresh(path: str | Path, room: int = 0) -> Iterator[IO[bytes]]:
-    """A file to write beside `path`, which takes its place when the block ends well and vanishes when it does not.
+    """A temporary file beside `path` that replaces it if the block succeeds and is removed if it fails.
 
-    With `room`, ValueError at once if so many bytes are not free. The lock on the file belongs to its descriptor: who duplicates
-    that holds the lock on.
+    With `room`, ValueError if fewer bytes are free. The lock on the file belongs to its descriptor; a duplicate of the descriptor
+    keeps it.
     """
     real = target(path)
     free = shutil.disk_usage(real.parent).free if room and real.parent.is_dir() else room
@@ -93,7 +93,7 @@ def fresh(path: str | Path, room: int = 0) -> Iterator[IO[bytes]]:
 
 
 def sync(folder: Path) -> None:
-    """Have the names in a folder on the disc, in case the power fails; where the system can do that."""
+    """Flush the names in a folder to the disc, in case the power fails, if the system can do that."""
     with suppress(OSError):
         fd = os.open(folder, os.O_RDONLY)
         try:
@@ -114,7 +114,7 @@ def write_all(fd: int, data: bytes | memoryview, offset: int | None = None) -> N
 
 
 def lock(fd: int) -> bool:
-    """Lock an open file against other descriptors that ask; False if another holds it. Where nothing can be locked, True."""
+    """Take the advisory lock of an open file; False if another descriptor has it. True if the system has no locks."""
     try:
         if fcntl is not None:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -124,7 +124,7 @@ def lock(fd: int) -> bool:
 
 
 def hold(path: Path) -> int:
-    """Descriptor of a file, made if there is none, that is locked by this process until it closes it.
+    """Descriptor of a file, created if there is none, that this process locks until it closes it.
 
     Raises BlockingIOError if another process holds it, another OSError if it cannot be written.
     """
@@ -139,11 +139,11 @@ def hold(path: Path) -> int:
 
 
 def release(fd: int, path: Path | None = None) -> None:
-    """Give a held file back, and remove it if it is still at `path`."""
+    """Release a held file, and remove it if it is still at `path`."""
     if path is not None and same(fd, path):
         path.unlink()
     with suppress(OSError):
-        if fcntl is not None:  # closing is not enough where a process that was forked from this one has it open too
+        if fcntl is not None:  # closing is not enough if a process forked from this one has it open too
             fcntl.flock(fd, fcntl.LOCK_UN)
     os.close(fd)
 
@@ -157,15 +157,15 @@ def same(fd: int, path: str | Path) -> bool:
 
 
 def _partial(folder: Path) -> IO[bytes]:
-    """A new file that is locked, with the rights of any other new file; what killed processes have left is removed."""
+    """A new locked file with the permissions of any new file; files left by killed processes are removed."""
     for left in folder.glob(f"{PARTIAL}*"):
         with suppress(OSError):
             release(hold(left), left)
     while True:
-        file = open(folder / f"{PARTIAL}{secrets.token_hex(8)}", "x+b")  # noqa: SIM115, it is closed by who asked
+        file = open(folder / f"{PARTIAL}{secrets.token_hex(8)}", "x+b")  # noqa: SIM115, the caller closes it
         if lock(file.fileno()) and same(file.fileno(), file.name):
             return file
-        file.close()  # another process has just taken it for one that was left
+        file.close()  # another process has just removed it as one that was left
 
 
 def _reason(error: Exception) -> str:

@@ -16,14 +16,14 @@ from discs.running.stats import Stats
 
 FORMAT = "rolling-discs run, version 1"
 UNITS = "any consistent system; units name the quantity, as 'length per time'"
-WROTE = 1 << 32  # added to the checksum of a frame that is there, so that it is never zero
-STATS_ROOM = 8192  # bytes; what is kept free for the stats of a run on its way
+WROTE = 1 << 32  # added to the checksum of a written frame, so that it is never zero
+STATS_ROOM = 8192  # bytes reserved for the stats of an unfinished run
 CHECKSUM = "CRC-32 of the frame plus 2**32; 0 where it has not been written"
 CHAINS: dict[str, type[Chain] | type[SteeredChain]] = {"Chain": Chain, "SteeredChain": SteeredChain}
 
 
 class Quantity(NamedTuple):
-    """Dimensions after time, unit and meaning of what a frame records."""
+    """Dimensions after time, unit and meaning of a recorded quantity."""
 
     dims: tuple[str, ...]
     units: str
@@ -66,7 +66,7 @@ COORDINATES = {
 
 
 class Header(NamedTuple):
-    """Everything but the frames.
+    """Everything in a file except the frames.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Header(NamedTuple):
 
 
 def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, Float]]:
-    """A problem as numbers and words, and arrays by the names of `PARAMETERS` of what differs from disc to disc."""
+    """A problem as numbers and text, and as arrays, by the names of `PARAMETERS`, where values differ between discs."""
     chain, initial = problem.chain, problem.initial
     if problem.loads:
         raise ValueError("a run with loads cannot be written to a file: files do not hold loads")
@@ -93,7 +93,7 @@ def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, Float]]:
 
 
 def rebuild(told: dict[str, Any], arrays: dict[str, Float]) -> Problem:
-    """The problem of `describe`; whatever does not make one is refused by it with a ValueError."""
+    """The problem that `describe` described; ValueError if the data do not make one."""
     given = told | arrays
     kind = CHAINS[checks.choice("chain", given.pop("chain", None), CHAINS)]
     duration, n = given.pop("duration", None), checks.whole("n", given.get("n"), 1)
@@ -104,7 +104,7 @@ def rebuild(told: dict[str, Any], arrays: dict[str, Float]) -> Problem:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what a run depends on."""
+    """Versions of Python and of the packages that a run depends on."""
     from importlib.metadata import PackageNotFoundError, version  # slow to import
 
     found = {"python": python_version()}
@@ -128,10 +128,10 @@ def header(
         "unit_system": UNITS,
         "problem": as_text(told),
         "method": str(stats.get("method")),
-        "stats": as_text(stats).ljust(0 if complete else STATS_ROOM),  # blanks, which JSON allows, are room for more
+        "stats": as_text(stats).ljust(0 if complete else STATS_ROOM),  # blanks, which JSON allows, reserve space
         "error_estimate": as_text(estimate),
         "versions": as_text(versions()),
-        # the one random thing: where the search for the stiffest mode starts
+        # the only random number: the start of the search for the stiffest mode
         "seeds": as_text({"suggest_dt": 0} if stats.get("dt_suggested") else {}),
         "complete": int(complete),
     }
@@ -139,7 +139,7 @@ def header(
 
 
 def header_checksum(attrs: dict[str, Any], static: dict[str, Float]) -> int:
-    """Of the problem, the times and the places."""
+    """Checksum of the problem, the times and the places."""
     total = zlib.crc32(attrs["problem"].encode())
     for name in sorted(static):
         total = zlib.crc32(np.ascontiguousarray(static[name]).data, total)
@@ -147,7 +147,7 @@ def header_checksum(attrs: dict[str, Any], static: dict[str, Float]) -> int:
 
 
 def frame_checksum(rows: dict[str, Float]) -> int:
-    """Of what one frame records, by name; never zero."""
+    """Checksum of the arrays of one frame, by name; never zero."""
     total = 0
     for name in sorted(rows):
         total = zlib.crc32(np.ascontiguousarray(rows[name]).data, total)
@@ -155,12 +155,12 @@ def frame_checksum(rows: dict[str, Float]) -> int:
 
 
 def as_text(value: Any) -> str:
-    """JSON; numbers of NumPy become Python's."""
+    """`value` as JSON; NumPy's numbers become Python's."""
     return json.dumps(value, default=lambda number: number.tolist())
 
 
 def fixed(value: Any) -> Any:
-    """A text as one of fixed length, which HDF5 keeps in the header itself."""
+    """Text as a string of fixed length, which HDF5 stores in the header itself; other values unchanged."""
     return np.bytes_(value.encode()) if isinstance(value, str) else value
 
 

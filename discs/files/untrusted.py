@@ -1,4 +1,4 @@
-"""What files say, checked before it is used and made harmless before it is shown."""
+"""Content of files, checked before use and escaped before display."""
 
 import json
 from typing import Any
@@ -12,7 +12,7 @@ TEXTS: dict[str, tuple[type, ...]] = {
     "error_estimate": (dict, type(None)),
     "versions": (dict,),
 }
-STATS: dict[str, tuple[type, ...]] = {  # whatever a reader of stats relies on; other things may be anything
+STATS: dict[str, tuple[type, ...]] = {  # the stats that readers rely on; others are not checked
     "method": (str,),
     "settings": (str,),
     "engine": (str,),
@@ -29,7 +29,7 @@ STATS: dict[str, tuple[type, ...]] = {  # whatever a reader of stats relies on; 
 
 
 def told(name: str, text: str | int) -> dict[str, Any] | None:
-    """What the attribute `name` of a file says, of the kinds that it must be; ValueError if it is something else."""
+    """The decoded JSON of the attribute `name`; ValueError if it has not the required types."""
     if not isinstance(text, str) or len(text) > LONGEST:
         raise ValueError(f"attribute {name!r} is not a text of at most {LONGEST} characters")
     value = json.loads(text)
@@ -46,15 +46,15 @@ def told(name: str, text: str | int) -> dict[str, Any] | None:
     return checked
 
 
-def _check(name: str, value: Any, kinds: tuple[type, ...]) -> None:
-    """JSON's numbers may be whole and have any number of digits; more than a double holds are refused."""
+def _check(name: str, value: object, kinds: tuple[type, ...]) -> None:
+    """ValueError for a value of another kind, or a whole number larger than a double, which JSON allows."""
     truth = isinstance(value, bool) and bool not in kinds
     if truth or not isinstance(value, kinds) or (isinstance(value, int) and abs(value) > 2**1000):
         raise ValueError(f"{name} is {type(value).__name__}, not {' or '.join(kind.__name__ for kind in kinds)}")
 
 
-def printable(value: Any) -> str:
-    """A value as one line of printable characters: whatever could steer a terminal is escaped, and what is long is cut."""
+def printable(value: object) -> str:
+    """A value as one line of printable characters: control characters are escaped, and a long text is cut."""
     text = str(value)
     line = "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text[:SHOWN])
     return line + " ..." * (len(text) > SHOWN)

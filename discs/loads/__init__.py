@@ -1,4 +1,4 @@
-"""What acts on the discs besides their springs and the ground: generalised forces f(t, q, v)."""
+"""Loads: generalised forces f(t, q, v) on the discs, besides those of springs and ground."""
 
 from discs.loads.linear import Linear
 from discs.loads.total import Total, total

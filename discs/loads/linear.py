@@ -16,7 +16,7 @@ class Linear(Load):
 
     Attributes
     ----------
-    constant : (rows, n), force in rows x and y, torque in the others; what broadcasts together with the others to that shape.
+    constant : (rows, n), force in rows x and y, torque in the others; any shape that broadcasts with the other two.
     damping, stiffness : the same, >= 0, force per velocity and per length, torque per rate and per angle.
 
     Raises

@@ -1,4 +1,4 @@
-"""Several loads at once."""
+"""The sum of several loads."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class Total(Load):
 
 
 def total(loads: tuple[Load, ...]) -> Load | None:
-    """One load for all, None for none; linear loads stay linear, which has a compiled form."""
+    """One load that is the sum of all, or None; a sum of linear loads is linear, and so has a compiled form."""
     if not loads:
         return None
     linear = [load for load in loads if isinstance(load, Linear)]

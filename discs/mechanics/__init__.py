@@ -1,7 +1,8 @@
 """General mechanical systems with linear velocity constraints, by Lagrange-d'Alembert with multipliers.
 
-`equations` has the equations, `system` what users make and move, `derivatives` those of a user's formulas, `saddle` the linear
-algebra, `motion` the motion in time with `sizes`, `drift`, `rank_drops` and `stiffness`. `lagrange` makes a system of a chain.
+`equations` has the equations of motion, `system` the class for users, `derivatives` the derivatives of a user's formulas, `saddle`
+the linear algebra, `motion` the time integration (with `sizes`, `drift`, `rank_drops`, `stiffness`). `lagrange` makes a system from
+a chain.
 """
 
 from discs.mechanics.equations import Response

@@ -1,17 +1,18 @@
-r"""Checks by a planar contact solver, pymunk: does contact with friction make a disc roll, and do discs get in each other's way?
+r"""Checks with pymunk, a planar contact solver: whether dry friction makes a disc roll, and whether discs touch.
 
 Needs the extra "contact" (pymunk 6.6 or newer; 6.6.2 and 7.3.1 are tested).
 
-**Rolling.** One disc in its own vertical plane on the ground, driven through a torsion spring of stiffness c by a fixed end that is
-turned by psi: torque tau = c (psi - theta). With f the ground's force, m x.. = f and I theta.. = tau - R f; rolling, x. = R theta.,
+**Rolling.** A disc stands on the ground in its own vertical plane. A torsion spring of stiffness c drives it; the spring's other
+end is held at the angle psi, so the torque is tau = c (psi - theta). With the ground's force f, m x.. = f and
+I theta.. = tau - R f. Rolling, x. = R theta., gives
 
     theta.. = tau/(I + m R^2),   a = R tau/(I + m R^2),   f = m a,
 
-so from rest theta = psi (1 - cos Omega t), Omega^2 = c/(I + m R^2). Dry friction can give f while |f| <= mu N, N = m g: the disc
-begins to slip at the start, where tau is largest, if mu < R c psi/((I + m R^2) g).
+and from rest theta = psi (1 - cos Omega t), Omega^2 = c/(I + m R^2). Dry friction supplies f while |f| <= mu N, N = m g. The torque
+is largest at the start, so the disc slips there if mu < R c psi/((I + m R^2) g).
 
-**Touching.** From above a disc is a rectangle, 2 R along its rolling direction by a thickness b along its axle. Neighbours at a
-distance d whose headings differ by delta, mirrored by the line between them, touch with their inner corners if
+**Touching.** Seen from above, a disc is a rectangle: 2 R along its rolling direction, thickness b along its axle. Two neighbours at
+distance d, with headings that differ by delta and are symmetric about the line between them, touch at their inner corners if
 
     2 R sin(|delta|/2) + b cos(delta/2) >= d;   fine chain, kappa = delta/d:  R |kappa| >= 1 - b/d;   thin discs:  R |kappa| >= 1.
 """
@@ -34,7 +35,7 @@ class Rolled:
     Attributes
     ----------
     t : (F,), times.
-    x, theta : (F,), place, length, and roll angle, rad; positive roll takes it to positive x.
+    x, theta : (F,), position (length) and roll angle (rad); positive roll moves the disc to positive x.
     speed, omega : (F,), their rates.
     friction, normal : (F - 1,), the ground's force in each step, along x and upwards.
     slip : (F,), speed - R omega.
@@ -62,7 +63,7 @@ def rolling_in_pymunk(
     dt: float,
     steps: int,
 ) -> Rolled:
-    """A disc from rest on the ground, driven through a torsion spring; nothing but dry friction makes it roll.
+    """A disc that starts at rest and is driven by a torsion spring; only dry friction makes it roll.
 
     Parameters
     ----------
@@ -71,8 +72,8 @@ def rolling_in_pymunk(
     twist : psi, the angle by which the spring's other end is turned.
     gravity : g > 0.
     friction : coefficient of friction mu, >= 0.
-    dt : the solver's step; its error is of first order.
-    steps : how many.
+    dt : time step of the solver, a first-order method.
+    steps : number of steps.
 
     Raises
     ------
@@ -89,7 +90,7 @@ def rolling_in_pymunk(
     space.gravity = (0, -g)
     space.collision_slop = 1e-3 * radius
     body = pymunk.Body(m, spin)
-    body.position = (0, radius - 0.5 * space.collision_slop)  # in contact, less deep than what the solver pushes out
+    body.position = (0, radius - 0.5 * space.collision_slop)  # in contact, by less than the overlap that the solver corrects
     disc = pymunk.Circle(body, radius)
     reach = radius * (abs(psi) + 1) * 10
     ground = pymunk.Segment(space.static_body, (-reach, 0), (reach, 0), 0)
@@ -108,17 +109,17 @@ def rolling_in_pymunk(
 
 
 def footprints_touch(run: Solution, radius: ArrayLike, thickness: float) -> Int:
-    """Which discs touch, seen from above as rectangles 2 R by `thickness`.
+    """Pairs of discs that touch, seen from above as rectangles 2 R by `thickness`.
 
     Parameters
     ----------
-    run : a motion with own headings, or one recorded with want=("slope",).
+    run : a run with own headings, or one with want=("slope",).
     radius : R > 0, a number or one per disc (N,).
     thickness : b > 0, along the axle; length, as the radius.
 
     Returns
     -------
-    (touches, 3), int: frame, disc, other disc with a higher number, in this order sorted.
+    (touches, 3), int: frame, disc, other disc (of the higher number); sorted by frame, then disc.
 
     Raises
     ------
@@ -133,7 +134,7 @@ def footprints_touch(run: Solution, radius: ArrayLike, thickness: float) -> Int:
     elif run.slope_x is not None and run.slope_y is not None:
         headings = np.arctan2(run.slope_y, run.slope_x)
     else:
-        raise ValueError('run must tell the headings: simulate(..., want=("slope",))')
+        raise ValueError('run must have headings: simulate(..., want=("slope",))')
     pymunk = _pymunk()
     space, numbers = pymunk.Space(), {}
     for i in range(n):

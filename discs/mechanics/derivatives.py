@@ -1,18 +1,18 @@
-r"""Derivatives of a user's formulas M(q), V(q), A(q) that cannot be lost without a word.
+r"""Verified derivatives of a user's formulas M(q), V(q), A(q).
 
-The complex step f(q + i h v) = f(q) + i h df/dq.v + O(h^2), h = 1e-30, has no rounding, but only where a formula is analytic and
-keeps complex numbers: `abs`, `np.linalg.norm`, an array of real numbers that is filled in, or a branch lose the imaginary part.
-Real differences lose nothing, but have an error. So both are taken:
+The complex step f(q + i h v) = f(q) + i h df/dq.v + O(h^2), h = 1e-30, has no rounding error, but it needs an analytic formula that
+keeps complex numbers: `abs`, `np.linalg.norm`, an array of real numbers that is filled in, or a branch drop the imaginary part.
+Real differences always work, but have an error. Both are used:
 
-* At the first q each coordinate's derivative is taken by both. They must agree within the differences' own error.
-* Later each complex step is compared with one real difference (order 4, four evaluations) along a direction that moves all
-  coordinates. Where they disagree, all coordinates are compared again.
-* A formula whose complex step fails once is differentiated by real differences from then on: order 8, error estimated by those of
-  order 6, about 1e-12 of the largest entry. `Formula.error` is the last such estimate.
+* At the first q every partial derivative is computed both ways. The two must agree within the error of the differences.
+* Later every complex step is compared with one real difference (order 4, four evaluations) along a direction that changes all
+  coordinates. If they disagree, all partial derivatives are compared again.
+* A formula whose complex step fails once is differentiated by real differences from then on: order 8, with the error estimated
+  from order 6, about 1e-12 of the largest entry. `Formula.error` is the latest estimate.
 
-The step h of a real difference belongs to a coordinate. It is found from below, in decades: rounding, eps |f|/h, falls, and
-as long as each derivative agrees with the best one so far within that one's error, h may grow. So a narrow feature of f is seen
-before a step is so long that it passes over it, and no unit of length is preferred.
+Each coordinate has its own step h of real differences. The search starts at a very small h and multiplies it by ten: the rounding
+error eps |f|/h falls, and h may grow as long as each derivative agrees with the best one so far within its error. A narrow feature
+of f is resolved before h is too long for it, and the result does not depend on units.
 """
 
 import importlib
@@ -29,10 +29,10 @@ from discs.arrays import Float
 
 STEP = 1e-30  # of the complex step
 EPS = float(np.finfo(float).eps)
-ENOUGH = 1e-12  # relative error at which no better step is sought
-TELLS = 1e-3  # a real difference whose error is larger says nothing: at q so large that rounding is as large as f's features
+ENOUGH = 1e-12  # relative error at which the search for a step stops
+USABLE = 1e-3  # relative error above which a real difference is no check: |q| is so large that rounding hides f's features
 MOST_SLACK = 1e-6
-ACCURATE = 1e-9  # a real difference whose error is larger, and larger than any before, gets a new step
+ACCURATE = 1e-9  # a relative error above this, and above all before, starts a new search for the step
 # weights of f(q + j h) - f(q - j h), j = 1 ... 4
 ORDER_8 = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
 ORDER_6 = np.array([3 / 4, -3 / 20, 1 / 60, 0])
@@ -41,7 +41,7 @@ ORDER_2 = np.array([1 / 2, 0])
 
 
 class Formula:
-    """A function q -> an array of a given shape, its values checked and its derivatives verified.
+    """A function q -> array of a given shape, with checked values and verified derivatives.
 
     Parameters
     ----------
@@ -90,21 +90,21 @@ class Formula:
         return self._derivatives(q, np.eye(self.size), self._mix * steps, None)
 
     def _derivatives(self, q: Float, directions: Float, weights: Float, v: Float | None) -> Float:
-        """Derivatives along the columns of `directions` (m, k), the check being along directions @ weights."""
+        """Derivatives along the columns of `directions` (m, k); the check is along directions @ weights."""
         assert self._steps is not None
         if self.how == "complex step":
             found = self._complex(q, directions)
             if found is not None and self._verified and (1e3 * EPS * np.abs(q) > self._steps).any():
-                return found  # q so large that rounding passes over features of f: a stage of a step that is not kept
+                return found  # |q| is so large that differences cannot check f: a trial state of a step that will be rejected
             off = np.inf if found is None else self._off(q, found @ weights, directions @ weights)
             if found is not None and off <= self._slack:
                 return found
             whole = self._examine(q)
             if self.how == "complex step" and found is not None:
-                self._slack = min(2 * off, MOST_SLACK)  # the comparison was at fault: a formula with more rounding than most
+                self._slack = min(2 * off, MOST_SLACK)  # the comparison was too strict: this formula has more rounding than most
                 return found
             return whole if v is None else (whole @ v)[..., None]
-        # a single direction has its own step, the shortest that the coordinates ask for
+        # one direction: the shortest step that its coordinates allow
         scales = weights if v is not None else self._steps
         taken = [self._difference(q, h * d, 1 / h) for h, d in zip(scales, directions.T, strict=True)]
         found, error = np.stack([d for d, _ in taken], axis=-1), max(e for _, e in taken)
@@ -122,10 +122,10 @@ class Formula:
         found = []
         try:
             with np.errstate(all="ignore"), warnings.catch_warnings(), _double():
-                warnings.simplefilter("ignore")  # of imaginary parts that are discarded: the check tells
+                warnings.simplefilter("ignore")  # about discarded imaginary parts, which the check detects
                 for d in directions.T:
                     found.append(np.imag(self._array(self._call(q + 1j * STEP * d), complex)) / STEP)
-        except Exception:  # whatever a formula says to a complex number
+        except Exception:  # a formula may raise anything for complex numbers
             return None
         return np.stack(found, axis=-1)
 
@@ -177,7 +177,7 @@ class Formula:
             by_step = self._complex(q, np.eye(self.size))
             if by_step is not None and np.isfinite(by_step).all():
                 agree = bool((np.abs(by_step - whole) <= 10 * np.array(errors) + 1e-3 * ENOUGH * size).all())
-                if (agree and error < TELLS) or (self._verified and error >= TELLS):
+                if (agree and error < USABLE) or (self._verified and error >= USABLE):
                     self._verified = True
                     return by_step
             self.how = "real differences"
@@ -185,7 +185,7 @@ class Formula:
         return whole
 
     def _search(self, q: Float, k: int) -> tuple[Float, float, float]:
-        """Derivative along coordinate k, its error, and the step; see the head of the module."""
+        """Derivative along coordinate k, its error, and the step; see the module's docstring."""
         unit = np.eye(self.size)[k]
         step = max(1e-12 * abs(q[k]), 1e-12)
         longest = 1e-2 * max(abs(q[k]), 1.0)
@@ -194,7 +194,7 @@ class Formula:
             new, error = self._difference(q, step * unit, 1 / step)
             error += 4 * EPS * abs(q[k]) / step * float(np.abs(new).max(initial=0.0))  # the step itself is rounded
             if best is not None and not np.abs(new - best[0]).max(initial=0.0) <= 2 * (best[1] + error):
-                break  # too long: passes over something that a shorter step saw
+                break  # too long: it disagrees with a shorter step
             if not np.isfinite(error):
                 if best is not None:
                     break
@@ -204,7 +204,7 @@ class Formula:
                     break
             step *= 10
         if best is None:
-            raise ValueError(f"{self.name} is not finite about q = {q}: it has no derivative there")
+            raise ValueError(f"{self.name} is not finite near q = {q}: it has no derivative there")
         return best
 
     def _difference(self, q: Float, d: Float, scale: float) -> tuple[Float, float]:
@@ -231,7 +231,7 @@ class Formula:
         return (np.array(found), size) if np.isfinite(size) else None
 
     def _array(self, given: Any, dtype: type | None) -> Float:
-        """What a formula returned as an array of its own, of the right shape; one row may be given as a vector."""
+        """A formula's value as a new array of the right shape; one row may be given as a vector."""
         if scipy.sparse.issparse(given):
             given = given.toarray()
         try:
@@ -257,7 +257,7 @@ class ShapeError(ValueError):
 
 
 def _double() -> AbstractContextManager[object]:
-    """JAX in double precision, where it is in use; formulas in `jax.numpy` are in single precision otherwise."""
+    """A context in which JAX, if it is imported, uses double precision instead of its default, single precision."""
     jax = sys.modules.get("jax")
     if jax is None:
         return nullcontext()

@@ -1,10 +1,10 @@
-r"""Drift off the constraints, and how it is taken back.
+r"""Drift off the constraints, and its correction.
 
-The equations keep A v = b only as a rate, so the errors of steps add up. After a step v is projected, orthogonally in M, on
-what the constraints allow. Rows whose one-form A_a dq is closed, d(A_a dq) = 0, are the gradients of functions c_a(q), as of a
-loop of bars or a pendulum's rod; then c_a must be c_a(0) + b_a t. Its drift is the line integral of A_a dq over the steps,
-whatever the path: Gauss's formula on the straight line from q_n to q_{n+1}. It is taken back by Newton's method along M^{-1}
-A^T.
+The equations of motion contain the constraint A v = b only in differentiated form, so the errors of the steps add up. After each
+step v is projected, orthogonally in M, onto the velocities that the constraints allow. A row whose one-form A_a dq is closed,
+d(A_a dq) = 0, is the gradient of a function c_a(q), as for a loop of bars or a pendulum's rod, and c_a must be c_a(0) + b_a t. The
+drift of c_a is the line integral of A_a dq over the steps, which does not depend on the path: Gauss's formula is applied on the
+straight line from q_n to q_{n+1}. Newton's method along M^{-1} A^T corrects q.
 """
 
 import numpy as np
@@ -42,18 +42,18 @@ class Drift:
             for u, w in self.sizes.unit * rng.standard_normal((2, 2, self.m)):
                 try:
                     one, other = system.constraint_rate(q, u) @ w, system.constraint_rate(q, w) @ u
-                except (ArithmeticError, ValueError):  # q is no place for the formulas
+                except (ArithmeticError, ValueError):  # the formulas are not defined at q
                     return np.zeros(len(system.owners), dtype=bool)
                 closed &= np.abs(one - other) <= CLOSED * (np.abs(one) + np.abs(other))
         return closed
 
     def add(self, before: Float, after: Float, time: float) -> None:
-        """Add what a step over `time` from q `before` to q `after` adds to the drift."""
+        """Add the drift of a step of length `time` from q `before` to q `after`."""
         if self.off.size:
             self.off = self.off + self._change(before, after) - self.drive * time
 
     def positions(self, q: Float) -> Float:
-        """q with the drift taken back; q itself where there is none."""
+        """q with its drift corrected; q itself if there is none."""
         for _ in range(4):
             if not self.off.size:
                 break

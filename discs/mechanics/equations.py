@@ -1,24 +1,24 @@
-r"""Lagrange-d'Alembert with its multipliers, as textbooks write it.
+r"""The Lagrange-d'Alembert equations with multipliers, in textbook form.
 
 A mechanical system with L = v.M(q)v/2 - V(q), v = q., moves under linear constraints A(q) v = b (b constant: zero for rolling). The
-forces that keep them do no work on virtual displacements, those with A dq = 0; so they are A^T lambda, and
+constraint forces do no work on virtual displacements, A dq = 0, so they have the form A^T lambda, and
 
     M v. = f + A^T lambda,   f = dL/dq - M. v,   A v. = -A. v,
 
-the second by differentiating the constraint. Both together are the saddle point
+The second equation is the differentiated constraint. Together they are the saddle point
 
     [ M  A^T ] (  v.    )   (  f     )
     [ A   0  ] ( -lambda) = ( -A. v  ).
 
 For discs a constraint is r. - e theta. = 0, two rows for each disc: lambda is the ground's force, and -e.lambda its torque about
-the axle. M is diagonal and a disc's rows of A take its own velocities only, so the sparse matrix is as good as block diagonal and
-solved in O(n).
+the axle. M is diagonal and a disc's rows of A involve only its own velocities, so the sparse matrix is block diagonal up to its
+order and is solved in O(n).
 
 The reduced form has no multipliers. With the columns of B spanning the kernel of A and some w with A w = -A. v,
 
     v. = w + B u,   B^T M B u = B^T (f - M w),   lambda = (A A^T)^{-1} A (M v. - f).
 
-The skew-gradient form of `discs.chains.rolling_discs` takes the B with B^T M B = 1. The three are one system of equations.
+The skew-gradient form of `discs.chains.rolling_discs` takes the B with B^T M B = 1. All three forms are equivalent.
 """
 
 from collections.abc import Callable, Sequence
@@ -49,16 +49,16 @@ class Equations:
 
     Attributes
     ----------
-    names : (m,), what the coordinates are.
-    owners : (c,), whose constraint each row of A is, as "disc 3".
+    names : (m,), names of the coordinates.
+    owners : (c,), the owner of each row of A in messages, as "disc 3".
     mass : q -> M, (m, m), an array or a sparse one; positive definite on the kernel of A.
     potential : q -> V.
     force : q, v -> f, (m,).
     constraint : q -> A, (c, m).
     constraint_rate : q, v -> A. = dA/dq.v, (c, m).
     drive : b, (c,).
-    symmetry : q -> X, (m, g): velocities of g one-parameter groups that leave L as it is, affine in q; None if none are known.
-    formulas : M(q), V(q), A(q) of `from_lagrangian`; each says how its derivatives are taken and their error.
+    symmetry : q -> X, (m, g): velocities of g one-parameter groups that leave L invariant, affine in q; None if none are known.
+    formulas : M(q), V(q), A(q) of `from_lagrangian`; `how` and `error` describe their derivatives.
     """
 
     names: tuple[str, ...]
@@ -103,7 +103,7 @@ class Equations:
 
         Raises
         ------
-        ValueError : if constraints are redundant or contradict each other, naming their owners, or inertia is missing.
+        ValueError : if constraints are redundant or contradict each other, with their owners, or inertia is missing.
         """
         q, v = self._vectors(q, v)
         f = self.force(q, v)
@@ -114,7 +114,7 @@ class Equations:
     def consistent_velocity(self, q: ArrayLike, v: ArrayLike) -> Float:
         """The velocity u nearest to v that the constraints allow: A u = b and (u - v).M(u - v) least, (m,).
 
-        So M (u - v) = A^T mu: it is what an impulse of the constraints' own forces makes of v.
+        Then M (u - v) = A^T mu: an impulse of the constraint forces changes v to u.
         """
         q, v = self._vectors(q, v)
         return self._solve(q, self.mass(q) @ v, self.drive).acceleration

@@ -1,14 +1,13 @@
-r"""Whether the ground can hold the discs: the friction that a motion without sliding needs.
+r"""The friction coefficient that rolling without sliding needs.
 
-The ground's force lambda on a disc lies in the plane. By Coulomb's law it holds while |lambda| <= mu N, N the force that presses
-the disc down. The model knows no gravity, so N is asked for. Discs stand upright by assumption: no load goes over from one to
-the next.
+The ground's force lambda on a disc lies in the plane. By Coulomb's law the disc rolls while |lambda| <= mu N with the normal force
+N. The model has no gravity, so the user gives N. Discs stay upright by assumption, so no load passes from one to the next.
 
-At a free end the coefficient depends on the number n of discs: in the limit the ground carries a point force there, and with slaved
-headings a couple too. The end disc's coefficient grows like n**2 (own headings: like n), so it answers for this chain and not for
-the rod. Away from free ends it converges; docs/mechanics.md has figures.
+At a free end the coefficient depends on the number n of discs: in the limit the ground exerts a point force there, and with slaved
+headings also a couple. The end disc's coefficient grows like n**2 (own headings: like n), so it describes this chain and not the
+rod. Away from free ends it converges; docs/mechanics.md has figures.
 
-lambda does no work: on the actual motion lambda.r. is what -e.lambda theta. takes.
+lambda does no work: its power lambda.r. on the motion of the centre and the power -e.lambda theta. of its torque cancel.
 """
 
 from dataclasses import dataclass
@@ -23,13 +22,13 @@ from discs.solution import Solution
 
 @dataclass(frozen=True)
 class Slip:
-    """Where rolling first needs more than the ground gives.
+    """The first disc that needs more friction than the ground has.
 
     Attributes
     ----------
-    disc : which one.
-    time : when |lambda| = mu N, between frames by linear interpolation; the first frame's time if it would not even start.
-    needed : the friction coefficient that it would take at the next frame.
+    disc : its index.
+    time : when |lambda| = mu N, by linear interpolation between frames; that of the first frame if the disc slips at once.
+    needed : the friction coefficient needed at the next frame.
     """
 
     disc: int
@@ -40,14 +39,13 @@ class Slip:
 def friction_needed(run: Solution, weight: ArrayLike) -> Float:
     """The friction coefficient |lambda|/N that each disc needs at each frame, (F, n).
 
-    Near free ends it grows with the number of discs, without a limit (see above): for what a rod needs take discs away from
-    the ends.
+    Near free ends it grows with the number of discs without limit (see above): for the rod, use discs away from the ends.
 
     Parameters
     ----------
     run : a run with want=("contact_force",).
-    weight : N > 0, the force that presses each disc to the ground, mass times length per time squared; a number or one per disc.
-        For discs of a rod under gravity g it is g rho w, `g * chain.density * chain.w`.
+    weight : N > 0, the normal force on each disc, mass times length per time squared; a number or one per disc.
+        For discs of a rod under gravity g it is g rho w: `g * chain.density * chain.w`.
 
     Raises
     ------
@@ -63,8 +61,8 @@ def friction_needed(run: Solution, weight: ArrayLike) -> Float:
 def first_slip(run: Solution, weight: ArrayLike, mu: ArrayLike) -> Slip | None:
     """The first disc that would slip on ground of friction coefficient mu, or None.
 
-    On chains with free ends it is mostly an end disc, and the more discs a chain has the earlier: see `friction_needed`.
-    What happens between two frames is seen only as far as frames show it: take as many as the motion needs.
+    On chains with free ends it is mostly an end disc, and it slips earlier if the chain has more discs: see `friction_needed`.
+    Only the frames are examined: record enough of them to resolve the motion.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Systems with a known answer: their record, their motion to both sides of the start, and the checks of their parameters."""
+"""Systems with a known solution: their record, integration in both time directions, checks of parameters."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -16,14 +16,14 @@ FRAMES = ("t", "q", "v", "multipliers", "energy", "residual")  # of a Trajectory
 
 @dataclass(frozen=True, eq=False)
 class Textbook:
-    """A system with a known answer.
+    """A system with a known solution.
 
     Attributes
     ----------
     system : the equations.
     q, v : (m,), coordinates and velocities at t = 0.
     exact : t -> (q, v, lambda), the motion in closed form; None if there is none.
-    invariants : functions of q, v that the motion keeps, by name.
+    invariants : conserved functions of q, v, by name.
     """
 
     system: MechanicalSystem
@@ -33,13 +33,13 @@ class Textbook:
     invariants: dict[str, Callable[[Float, Float], float]] = field(default_factory=dict)
 
     def integrate(self, times: ArrayLike, rtol: float = 1e-11, **options: Any) -> Trajectory:
-        """The motion of the start at t = 0, at times (F,), increasing, which may lie before and after it.
+        """The motion from the initial state at t = 0, at increasing times (F,), which may be negative.
 
         `options` as of `MechanicalSystem.integrate`.
         """
         t = np.atleast_1d(checks.array("times", times))
         if t.ndim != 1 or not t.size or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
-            raise ValueError("times must be at least one, increasing; the start is that of t = 0")
+            raise ValueError("times must be at least one, increasing; the initial state is at t = 0")
         before, after = t[t < 0][::-1], t[t >= 0]
         if not before.size and after.size > 1 and after[0] == 0:
             return self.system.integrate(self.q, self.v, after, rtol, **options)
@@ -49,14 +49,14 @@ class Textbook:
             parts.append(_frames(path, slice(None, 0, -1)))
         if after.size:
             first = () if after[0] == 0 else (0.0,)
-            # the start alone is the first frame of any motion
+            # if only the initial state is needed, it is the first frame of a short motion
             path = self.system.integrate(self.q, self.v, [*first, *after] if after[-1] > 0 else [0.0, _moment(t)], rtol, **options)
             parts.append(_frames(path, slice(len(first), len(first) + after.size)))
         return _joined(parts)
 
 
 def _moment(t: Float) -> float:
-    """A short time, for a motion of which only the start is asked for."""
+    """A short time, for a motion of which only the initial state is needed."""
     return 1e-6 * float(np.abs(t).max()) or 1e-6
 
 

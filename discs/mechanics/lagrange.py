@@ -1,4 +1,4 @@
-"""Discs as a mechanical system with all coordinates and the ground's forces as unknowns."""
+"""Discs as a mechanical system whose unknowns are all coordinates and the ground's forces."""
 
 from typing import Any
 
@@ -12,16 +12,16 @@ from discs.solution import Solution
 
 
 def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSystem:
-    """Lagrange-d'Alembert for the discs of a problem, A the rows r. - e theta. and lambda the ground's forces.
+    """Lagrange-d'Alembert equations of the discs of a problem: A v is r. - e theta., lambda are the ground's forces.
 
     Coordinates are those of all discs row by row, (x_0 ... x_{n-1}, y_0 ..., theta_0 ..., and phi_0 ... with own headings), so that
     q.reshape(-1, n) has one row for each; multipliers.reshape(2, n) are the ground's forces (x, y). `frames` gives q and v of a
     problem's start or of a run.
 
-    Symmetries are the motions of the plane (those that a shifted ring allows) and turning all discs of a piece alike, a piece
-    being discs that torsion springs join.
+    Symmetries are the motions of the plane (those that a shifted ring allows) and an equal roll of all discs of a piece. A piece is
+    a set of discs joined by torsion springs.
 
-    M and A are sparse arrays, or with `dense` plain ones, quicker for a few discs.
+    M and A are sparse arrays or, with `dense`, NumPy arrays, which are faster for a few discs.
     """
     system, n = problem.system, problem.chain.n
     rows, m = len(system.rows), len(system.rows) * n
@@ -71,7 +71,7 @@ def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSyste
 
 
 def _moves(problem: Problem) -> int:
-    """Motions of the plane: two shifts, and a turn unless a ring closes up to a shift only."""
+    """Number of symmetries of the plane: two translations, and a rotation unless a ring closes only up to a shift."""
     return 2 if np.any(problem.chain.shift) else 3
 
 
@@ -86,7 +86,7 @@ def _pieces(problem: Problem) -> Float:
 
 
 def frames(problem: Problem, run: Solution | None = None) -> tuple[Float, Float]:
-    """Coordinates and velocities of a run with want=("velocity",), (F, m); of the problem's start without a run, (m,)."""
+    """Coordinates and velocities of a run with want=("velocity",), (F, m); without a run, of the initial state, (m,)."""
     system = problem.system
     if run is None:
         z = problem.start()

@@ -1,25 +1,26 @@
-r"""Symmetry and momentum: what the rolling constraint leaves of Noether's theorem.
+r"""Symmetry and momentum: Noether's theorem under the rolling constraint.
 
-Let the velocities xi_Q(q) = X(q) xi, xi in a vector space g, be those of a group that leaves L as it is: motions of the plane, and
-turning discs that torsion springs join alike. For any xi, constant or not, p = M v has
+Let xi_Q(q) = X(q) xi, with xi in a vector space g, be the velocities of a group that leaves L invariant: motions of the plane, and
+an equal roll of all discs that torsion springs join. For any xi, constant or not, p = M v satisfies
 
     d/dt <p, xi_Q> = <A^T lambda, xi_Q> + <p, (d xi/dt)_Q>,
 
-because L does not change along xi_Q and the only other force is that of the ground. For constant xi this is the balance of
+because L is invariant along xi_Q and the only other force is the ground's. For constant xi this is the balance of
 momentum, of moment of momentum and of spin with the ground's forces (`symmetry_momenta`).
 
-The ground does no work on directions that obey the constraints, A xi_Q = 0. Those of them that are symmetries form the kernel g^q
-of A(q) X(q); for a section, xi(q) in g^q, the *nonholonomic momentum map* J = <p, xi_Q> obeys the *momentum equation* without
-lambda
+The ground does no work along directions that obey the constraints, A xi_Q = 0. The symmetries among them form the kernel g^q of
+A(q) X(q). For a section xi(q) in g^q, the *nonholonomic momentum map* J = <p, xi_Q> obeys the *momentum equation*, which does not
+contain lambda:
 
     dJ/dt = <p, (d xi/dt)_Q>.
 
-J is kept where xi is constant (the paper's NHnoether); elsewhere only if the right side happens to vanish, as it does for a single
-disc. Sections here are xi_j(q) = P(q) xi_j, P the orthogonal projector of g onto g^q and xi_j a basis of g^q at the start. With
-N = A X and its pseudo-inverse N+, P = 1 - N+ N, and N P = 0 gives P. = -N+ N. P - (N+ N. P)^T while the rank of N stays.
+J is conserved if xi is constant (the paper's NHnoether), and otherwise only if the right side happens to vanish, as for a single
+disc. The sections used here are xi_j(q) = P(q) xi_j, P the orthogonal projector of g onto g^q and xi_j a basis of g^q at the start.
+With N = A X and its pseudo-inverse N+, P = 1 - N+ N, and N P = 0 gives P. = -N+ N. P - (N+ N. P)^T while the rank of N is constant.
 
-Many discs leave no such direction: N discs have 2N constraints, and g has 3 + (pieces joined by torsion springs) dimensions. One
-disc has two, to roll and to turn; two discs without torsion between them one: both roll about the point where their axles meet.
+Many discs have no such direction: N discs have 2N constraints, and g has 3 + (pieces joined by torsion springs) dimensions. One
+disc has two: it can roll and turn. Two discs without torsion between them have one: both roll about the point where their axles
+meet.
 
 Source: A. M. Bloch, P. S. Krishnaprasad, J. E. Marsden, R. M. Murray, Nonholonomic mechanical systems with symmetry, Arch. Rational
 Mech. Anal. 136 (1996) 21-99, section 4.
@@ -47,7 +48,7 @@ class Momenta:
     ----------
     t : (F,).
     value : (F, k), <p, xi_Q>.
-    rate : (F, k), d/dt of it by the momentum equation.
+    rate : (F, k), its time derivative by the momentum equation.
     section : (F, k, g), xi in the basis of `MechanicalSystem.symmetry`.
     """
 
@@ -57,23 +58,23 @@ class Momenta:
     section: Float
 
     def residual(self) -> Float:
-        """value(t) - value(0) - integral of rate, (F, k): zero but for the method's error and that of a cubic spline in t."""
+        """value(t) - value(0) - integral of rate, (F, k): zero up to the errors of the method and of a cubic spline in t."""
         found: Float = self.value - self.value[0] - CubicSpline(self.t, self.rate).antiderivative()(self.t)
         return found
 
 
 def symmetry_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> Momenta:
-    """Momenta of all known symmetries and what the ground's forces make of them, d/dt <p, xi_Q> = <A^T lambda, xi_Q>.
+    """Momenta of all known symmetries, and their rates by the ground's forces, d/dt <p, xi_Q> = <A^T lambda, xi_Q>.
 
     Parameters
     ----------
     system : with a `symmetry`.
     t : (F,), times, at least 4.
-    q, v : (F, m), a motion: of `MechanicalSystem.integrate`, or of a run by `discs.mechanics.lagrange.frames`.
+    q, v : (F, m), a motion, from `MechanicalSystem.integrate` or, for a run, from `discs.mechanics.lagrange.frames`.
 
     Returns
     -------
-    Momenta; the section is the identity, (F, g, g). Of discs: momentum along x, y, moment of momentum about the origin and spin.
+    Momenta; the section is the identity, (F, g, g). For discs: momentum along x, y, moment of momentum about the origin and spin.
     """
     t, path = _motion(system, t, q, v)
     value, rate = [], []
@@ -108,8 +109,8 @@ def nonholonomic_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v
         projector = np.eye(x.shape[1]) - inverse @ n
         if round(float(np.trace(projector))) != len(start):
             raise ValueError(
-                f"the symmetries that the constraints allow must be as many all along: {len(start)} at the start, "
-                f"{round(float(np.trace(projector)))} at t = {time:g}; take the motion in parts"
+                f"the number of symmetries that the constraints allow must not change: {len(start)} at the start, "
+                f"{round(float(np.trace(projector)))} at t = {time:g}; split the motion there"
             )
         half = inverse @ n_rate @ projector
         p = system.momentum(q_now, v_now)
@@ -128,7 +129,7 @@ def admissible_symmetries(system: MechanicalSystem, q: ArrayLike) -> Float:
 
 
 def _rank(system: MechanicalSystem, q: Float, n: Float, x: Float) -> int:
-    """Rank of N = A X, whatever the units: rows of A and columns of X of norm 1 in coordinates of mass 1."""
+    """Rank of N = A X, independent of units: rows of A and columns of X have norm 1 in coordinates of mass 1."""
     unit = units(system, q)
     rows = np.linalg.norm(dense(system.constraint(q)) * unit, axis=1)
     columns = np.linalg.norm(x / np.where(unit > 0, unit, 1.0)[:, None], axis=0)
@@ -143,7 +144,7 @@ def _generators_rate(system: MechanicalSystem, q: Float, v: Float) -> Float:
 
 def _generators(system: MechanicalSystem, q: Float) -> Float:
     if system.symmetry is None:
-        raise ValueError("momenta belong to symmetries; give the system a symmetry, q -> X (m, g)")
+        raise ValueError("momenta need a symmetry; give the system one, q -> X (m, g)")
     return system.symmetry(q)
 
 

@@ -1,12 +1,13 @@
-r"""The motion of a mechanical system in time, by SciPy's methods on v. from the saddle point.
+r"""Time integration of a mechanical system by SciPy's methods, with accelerations from the saddle point.
 
-The error of a step is bounded by rtol |y| + atol. Unless given, atol is 1e-3 rtol of each quantity's own size
-(`discs.mechanics.sizes`), so steps are the same in any units. After each step of an explicit method q and v are brought back to
-the constraints (`discs.mechanics.drift`). A moment at which constraints become dependent is passed where the motion is smooth
-(`discs.mechanics.rank_drops`). An implicit method takes over where the problem is stiff (`discs.mechanics.stiffness`).
+The error of a step is bounded by rtol |y| + atol. By default atol is 1e-3 rtol times each quantity's own size
+(`discs.mechanics.sizes`), so the steps do not depend on units. After each step of an explicit method q and v are projected back
+onto the constraints (`discs.mechanics.drift`). If constraints become dependent at one moment, the integration continues where the
+motion is smooth (`discs.mechanics.rank_drops`). If the problem is stiff, it continues with an implicit method
+(`discs.mechanics.stiffness`).
 
-Where the equations have no finite answer, steps get shorter, and where no step is short enough an error names the time and the
-reason.
+If the equations have no finite solution at a trial state, the step is shortened. If no step is short enough, an error names the
+time and the cause.
 """
 
 from collections import deque
@@ -30,8 +31,9 @@ from discs.warn import warn
 METHODS = ("auto", "DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 EXPLICIT = ("DOP853", "RK45", "RK23")  # of one step: the state can be corrected after each
 LEAST_RTOL = 100 * float(np.finfo(float).eps)
-LOST = 0.01  # of the largest kinetic energy, or of a constraint: a motion is warned of
-STALLED, STALLED_NEAR = 1000, 50  # this many steps over less than 1e-6 of the time end a motion; so near to dependent rows
+DRIFT_WARNING = 0.01  # relative to the largest kinetic energy, or to a constraint's size
+STALLED = 1000  # so many steps over less than 1e-6 of the time span stop the integration
+STALLED_NEAR = 50  # the same near dependent rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ class Trajectory:
 
 
 class Rate:
-    """d/dt of (q, v, mu). Where it has no finite value it is nan, so that steps get shorter, and `trouble` says why."""
+    """d/dt of (q, v, mu); nan where it is not finite, which makes the solver shorten its step; `trouble` is the cause."""
 
     def __init__(self, system: Equations) -> None:
         self.system, self.m = system, len(system.names)
@@ -86,10 +88,10 @@ def integrate(
     atol: ArrayLike | None,
     progress: bool,
 ) -> Trajectory:
-    """`MechanicalSystem.integrate`, of checked q, v, mu."""
+    """`MechanicalSystem.integrate` for q, v and mu that are checked."""
     t = np.atleast_1d(checks.array("times", times))
     if t.ndim != 1 or t.size < 2 or not np.isfinite(t).all() or not (np.all(np.diff(t) > 0) or np.all(np.diff(t) < 0)):
-        raise ValueError("times must be at least two, increasing (or all decreasing), the first that of q and v")
+        raise ValueError("times must be at least two, all increasing or all decreasing; the first is that of q and v")
     checks.choice("method", method, METHODS)
     if checks.number("rtol", rtol, positive=True) < LEAST_RTOL:
         raise ValueError(f"rtol must be at least {LEAST_RTOL:.3g}, as doubles are rounded; got {rtol!r}")
@@ -106,7 +108,7 @@ def integrate(
             f"v must obey the constraints; that of {system.owners[worst]} is off by {off[worst]:.3g}: "
             "take consistent_velocity(q, v)"
         )
-    system.accelerations(q, v, mu)  # what is wrong at the start is raised as it is; derivatives are examined
+    system.accelerations(q, v, mu)  # raises an error of the initial state directly, and examines the derivatives
     rtol = _within_reach(system, rtol)
     found, stats = _follow(system, start, t, method, rtol, atol, progress)
     path = _trajectory(system, t, found, mu is not None, stats)
@@ -115,12 +117,12 @@ def integrate(
 
 
 def _within_reach(system: Equations, rtol: float) -> float:
-    """A tolerance that the derivatives of formulas allow, with a warning where it is not the one asked for."""
+    """rtol or, with a warning, the error of the formulas' derivatives if that is larger."""
     error, name = max(((f.error, f.name) for f in system.formulas), default=(0.0, ""))
     if error <= 10 * rtol:
         return rtol
     warn(
-        f"derivatives of {name}(q) are known to {error:.1g} only, as it has more rounding than doubles have, or is not smooth; "
+        f"derivatives of {name}(q) have an error of {error:.1g}, as it has more rounding than doubles have, or is not smooth; "
         f"rtol is raised from {rtol:g} to {error:.1g}"
     )
     return error
@@ -167,7 +169,7 @@ def _follow(
     solver = solver_from(times[0], start)
     form = "{l_bar}{bar}| t = {n:.4g} of {total:.4g} [{elapsed}<{remaining}]"
     bar = tqdm(total=span, desc="motion", bar_format=form, delay=1, disable=not progress)
-    with bar, np.errstate(all="ignore"):  # a trial step may be wild
+    with bar, np.errstate(all="ignore"):  # a trial step may overflow
         while done < times.size:
             before, y_before, said = solver.t, solver.y, solver.step()
             steps += 1
@@ -216,12 +218,12 @@ def _follow(
 
 
 def _reason(solver: "scipy.integrate.OdeSolver", rate: Rate, ranks: RankDrops, said: str | None) -> str:
-    """Why a motion ends."""
+    """Why the integration stopped."""
     if why := ranks.words() or rate.trouble:
         return why
     if said:
         return f"{said} (V = {rate.system.potential(solver.y[: rate.m]):.3g} there)"
-    return f"steps have come down to {abs(solver.step_size):.1g}; take a larger rtol, or a method for stiff problems"
+    return f"the step has fallen to {abs(solver.step_size):.1g}; take a larger rtol, or a method for stiff problems"
 
 
 def _trajectory(system: Equations, t: Float, found: Float, charged: bool, stats: dict[str, Any]) -> Trajectory:
@@ -243,9 +245,9 @@ def _trajectory(system: Equations, t: Float, found: Float, charged: bool, stats:
 
 
 def _conserving(system: Equations, path: Trajectory) -> bool:
-    """Whether the forces are those of L, which do not change the energy: v.f + d(v.Mv/2 + V)(v) = 0 with v held, at all frames.
+    """Whether the forces conserve the energy, as those of L do: v.f + d(v.Mv/2 + V)(v) = 0 with v held fixed, at all frames.
 
-    A `force` that a user put in place of that of L may damp or drive.
+    A `force` that a user gave instead of that of L may damp or drive.
     """
     for q, v in zip(path.q, path.v, strict=True):
         step = 1e-5 * np.abs(path.q).max() / max(float(np.abs(v).max()), 1e-300)
@@ -258,20 +260,20 @@ def _conserving(system: Equations, path: Trajectory) -> bool:
 
 
 def _watch(system: Equations, path: Trajectory) -> None:
-    """Warn where energy is lost or gained, or a constraint left."""
+    """Warn if a conserved energy has changed, or a constraint is violated."""
     method, cure = path.stats["method"], f"the motion may not be trusted; take a smaller rtol than {path.stats['rtol']:g}"
     kinetic = np.array([0.5 * v @ (system.mass(q) @ v) for q, v in zip(path.q, path.v, strict=True)])
     off = np.abs(path.energy - path.energy[0])
     rounding = 1e-12 * np.abs(path.energy - kinetic).max()
     f = int(np.argmax(off))
-    if not np.any(system.drive) and off[f] > LOST * kinetic.max() + rounding and _conserving(system, path):
+    if not np.any(system.drive) and off[f] > DRIFT_WARNING * kinetic.max() + rounding and _conserving(system, path):
         warn(
             f"{method}: energy is conserved, but at t = {path.t[f]:g} it is {path.energy[f]:.3g} and not {path.energy[0]:.3g}: "
             f"{cure}"
         )
     for t, q, v in zip(path.t, path.q, path.v, strict=True):
-        left = np.abs(system.residual(q, v)) > LOST * residual_size(system, q, v)
+        left = np.abs(system.residual(q, v)) > DRIFT_WARNING * residual_size(system, q, v)
         if left.any():
             owner = system.owners[int(np.argmax(left))]
-            warn(f"{method}: at t = {t:g} the velocity is off the constraint of {owner} by over a hundredth: {cure}")
+            warn(f"{method}: at t = {t:g} the velocity violates the constraint of {owner} by over 1 %: {cure}")
             return

@@ -1,7 +1,7 @@
-r"""Driven oscillators of the nonholonomic literature, `Textbook`s with invariants in place of a closed form.
+r"""Driven oscillators of the nonholonomic literature: `Textbook`s with invariants instead of a closed form.
 
-K. Modin, O. Verdier, What makes nonholonomic integrators work?, Numer. Math. 145 (2020) 405-435, say why methods must be tried on
-systems that are not reversible as well; the oscillators here are of the kind they study.
+K. Modin, O. Verdier, What makes nonholonomic integrators work?, Numer. Math. 145 (2020) 405-435, explain why methods must also be
+tested on systems that are not reversible. The oscillators here are of the kind they study.
 """
 
 from collections.abc import Callable
@@ -29,12 +29,12 @@ def contact_oscillator(
 ) -> Textbook:
     r"""The contact oscillator: x. + (y/b) z. = 0, V = (K (x^2 + z^2) + k y^2)/2; b = `width`, k = `driver_stiffness`.
 
-    The constraint's force has no part in y, which oscillates by itself, and drives the others: (x, z) move with speed sigma along
-    (-sin chi, cos chi), tan chi = y/b, where m sigma. = K (x sin chi - z cos chi). So (x, z, sigma sqrt(m/K)) turns on a sphere,
-    and both energies are kept. `speed` is sigma and `drift` is y. at the start, q = (x, y, z).
+    The constraint force has no component along y, so y oscillates freely and drives the others: (x, z) moves with speed sigma along
+    (-sin chi, cos chi), tan chi = y/b, where m sigma. = K (x sin chi - z cos chi). The point (x, z, sigma sqrt(m/K)) stays on a
+    sphere, and both energies are conserved. `speed` is sigma and `drift` is y. at the start, q = (x, y, z).
 
-    A motion with y through t_0 at rest is the same before and after: reversible, as all usual test problems are; see
-    `driven_oscillator` for one that is not.
+    If y is at rest at a time t_0, the motion before t_0 mirrors the motion after it. The system is reversible, like all usual test
+    problems; `driven_oscillator` is not.
 
     Source: R. McLachlan, M. Perlmutter, J. Nonlinear Sci. 16 (2006) 283-328; Modin and Verdier (2020).
     """
@@ -56,13 +56,12 @@ def driven_oscillator(
 ) -> Textbook:
     r"""A continuously variable transmission that is not reversible: x. + sin(y) z. = 0, U(y) = wave (cos y + skew sin(2y)/2).
 
-    As `contact_oscillator`, but the driver is a pendulum that goes round: without a turning point, it is the same before and
-    after some moment only if U is even about some place. skew = 0 is the reversible one; any other is integrable still, driver
-    and oscillator keep an energy each, but not reversible, and methods that owe their long-time behaviour to reversibility fail
-    on it.
+    As `contact_oscillator`, but the driver is a pendulum that rotates. It has no turning point, so its motion is reversible only if
+    U is even about some point, which needs skew = 0. For any other skew the system is still integrable (driver and oscillator each
+    conserve an energy) but not reversible, and methods whose long-time behaviour relies on reversibility fail on it.
 
     Source: of the kind that Modin and Verdier (2020) construct by perturbing the pendulum-driven transmission; parameters are ours.
-    Raises ValueError unless the driver goes round.
+    Raises ValueError unless the driver rotates.
     """
     positive(mass=mass, stiffness=stiffness, driver_mass=driver_mass, wave=wave)
     finite(skew=skew, speed=speed, drift=drift)
@@ -74,7 +73,7 @@ def driven_oscillator(
     top = float(np.max(hill(np.linspace(0, 2 * np.pi, 1001))))
     if 0.5 * driver_mass * drift**2 + float(hill(start[1])) <= top:
         least = np.sqrt(2 * (top - float(hill(start[1]))) / driver_mass)
-        raise ValueError(f"drift must be above {least:.6g} in size for the driver to go round; got {drift!r}")
+        raise ValueError(f"drift must be above {least:.6g} in size for the driver to rotate; got {drift!r}")
     return _driven(("x", "y", "z"), (mass, stiffness, driver_mass), hill, np.sin, q, speed, drift)
 
 
@@ -87,7 +86,7 @@ def _driven(
     speed: float,
     drift: float,
 ) -> Textbook:
-    """An oscillator in (x, z) with x. + gear(y) z. = 0, y moving by itself in the potential `hill`."""
+    """An oscillator in (x, z) with x. + gear(y) z. = 0; y moves independently in the potential `hill`."""
     mass, stiffness, driver = parameters
     start = checks.vector("q", q, 3)
     system = MechanicalSystem.from_lagrangian(

@@ -1,15 +1,17 @@
-r"""Moments at which rows of A become dependent on the way: found ahead, and passed where the motion is smooth.
+r"""Moments at which rows of A become dependent: predicted, and crossed in one step if the motion is smooth.
 
-A crank and a rod of equal length that both stand across the slider, a parallelogram of bars that is flat: there the smallest
-singular value sigma of A is zero, and two ways part. The directions of the rows have limits along each way, and a motion that
-arrives on one goes on smoothly on it. But a path that misses the place by c follows the hyperbola sigma^2 ~ c, its velocity is
-off by c/tau^2 at a time tau before, and a step control that resolves this comes to a stop or changes ways.
+Examples: a crank and a rod of equal length, both perpendicular to the slider; a flat parallelogram of bars. There the smallest
+singular value sigma of A is zero, and the set of configurations has two branches. Along each branch the directions of the rows have
+limits, so a motion that arrives on a branch continues on it smoothly. But a path that misses the branch point by c follows the
+hyperbola sigma^2 ~ c; its velocity is off by c/tau^2 at a time tau before, and a step control that resolves this stalls or changes
+branch.
 
-So the moment is predicted from sigma = u.A w and its rate u.A. w, u and w singular vectors. From a time tau before it one step
-is taken over it, to 1.1 tau behind; DOP853 evaluates nothing within tau/4 of the moment. The same is done in two steps. Their
-difference times sigma^2 is c. Rows that are closed are held to rounding (`discs.mechanics.drift`), so that c is the data's own:
-up to `MISS` the motion is taken to pass, and above it the steps follow the turn: one that would go over it is taken again,
-shorter. Other rows have the errors of the steps; a motion that misses by more than those stops in words.
+The moment is predicted from sigma = u.A w and its rate u.A. w, with singular vectors u and w. From a time tau before it, one step
+crosses it and ends 1.1 tau after it; no stage of DOP853 is within tau/4 of the moment. The same interval is also crossed in two
+steps. The difference of the two results times sigma^2 is c. Closed rows are accurate to rounding (`discs.mechanics.drift`), so
+their c is a property of the initial data: up to `MISS` the motion passes through the branch point; above it, the steps follow the
+turn, and a step that would cross the moment is repeated with a shorter length. For other rows c contains the errors of the steps;
+if it is larger than these, an error ends the integration.
 """
 
 from collections.abc import Callable
@@ -25,14 +27,14 @@ from discs.mechanics.equations import Equations
 from discs.mechanics.saddle import dense
 from discs.mechanics.sizes import Sizes
 
-SMOOTH = 1e-5  # most that two ways over a moment may differ, relative to each quantity's size
-MISS = 1e-9  # relative; initial data with nine digits still meet the place where ways part
+SMOOTH = 1e-5  # largest difference of the two results, relative to each quantity's size
+MISS = 1e-9  # relative; initial data with nine digits still reach the branch point
 NEAR = 1e-2  # of the largest sigma so far
 LARGEST = 100_000  # entries of A; sigma is not watched beyond
 
 
 class Passage(NamedTuple):
-    """A step over dependent rows: the moment, the step's end, (q, v, mu) there, and at times between."""
+    """A step across a moment of dependent rows: the moment, the step's end, (q, v, mu) there, and a function for times between."""
 
     moment: float
     end: float
@@ -41,9 +43,9 @@ class Passage(NamedTuple):
 
 
 class RankDrops:
-    """Watches sigma, the smallest singular value of A with rows relative to their largest norms so far, in coordinates of mass 1.
+    """The smallest singular value sigma of A along a motion; rows relative to their largest norms so far, coordinates of mass 1.
 
-    owners : whose rows become dependent, in words.
+    owners : owners of the rows that become dependent, for messages.
     """
 
     def __init__(self, system: Equations, sizes: Sizes, drift: Drift) -> None:
@@ -55,7 +57,7 @@ class RankDrops:
         self.rows: Float | None = None  # A of the last state, scaled
 
     def crossed(self, y: Float) -> bool:
-        """Whether det(A A_0^T), A_0 of the last state, is negative: a step went over dependent rows unasked."""
+        """Whether det(A A_0^T), A_0 of the last state, is negative: a step crossed dependent rows by accident."""
         if not self.watched or self.rows is None or not np.isfinite(y).all():
             return False
         rows = dense(self.system.constraint(y[: self.m])) * self.sizes.unit
@@ -65,19 +67,19 @@ class RankDrops:
         return np.where(self.norms > 0, self.norms, 1.0)[:, None]
 
     def words(self) -> str:
-        """Why a motion ends, if it is because of dependent rows."""
+        """The message of an integration that dependent rows end; empty if they do not."""
         if not self.watched or self.sigma >= NEAR * self.largest:
             return ""
         return (
             f"the constraints of {self.owners} become dependent there (smallest singular value of A {self.sigma:.1g}, "
-            f"{self.largest:.1g} before), where ways part, and the motion has no smooth way on, or its error so far is too "
-            "large to tell which is its own; take a smaller rtol, or stop before"
+            f"{self.largest:.1g} before): the motion branches there, and no branch continues it smoothly, or its error is too "
+            "large to choose one; take a smaller rtol, or stop earlier"
         )
 
     def passage(
         self, rate: Callable[[float, Float], Float], solver: "scipy.integrate.OdeSolver", direction: float, rtol: float
     ) -> Passage | None:
-        """A step over a moment of dependent rows less than a step away; None if there is none, or no smooth way over it."""
+        """A step across a moment of dependent rows less than a step away; None if there is none, or the motion is not smooth."""
         if not self.watched:
             return None
         step, tau = abs(getattr(solver, "h_abs", solver.step_size)), self._time_to_zero(solver.y, direction)
@@ -85,7 +87,7 @@ class RankDrops:
             self.tried = np.inf
             return None
         if isinstance(solver, scipy.integrate.DOP853) and tau > 0.6 * step:
-            solver.h_abs = 0.6 * tau  # and over it from there
+            solver.h_abs = 0.6 * tau  # the next step crosses it from there
             return None
         if tau > 0.3 * self.tried:
             return None
@@ -96,12 +98,12 @@ class RankDrops:
         twice, _ = _steps(rate, y, (t, t + 0.05 * length, t + length))
         off = float(np.max(np.abs(once - twice) / np.maximum(self.sizes.of(y), np.abs(once))))
         if off < SMOOTH and off * (self.sigma / self.largest) ** 2 < (MISS if self.held else 100 * rtol):
-            self.rows = None  # rows have other signs there
+            self.rows = None  # the rows change sign
             return Passage(t + direction * tau, t + length, once, between)
         return None
 
     def lost(self) -> bool:
-        """Whether rows that drift are so near to dependent that no step can be trusted."""
+        """Whether rows that are not closed are too near to dependent for any step to be reliable."""
         return self.watched and not self.held and self.sigma < NEAR * self.largest
 
     def _time_to_zero(self, y: Float, direction: float) -> float:
@@ -123,7 +125,7 @@ class RankDrops:
 
 
 def _steps(rate: Callable[[float, Float], Float], y: Float, times: tuple[float, ...]) -> tuple[Float, Callable[[float], Float]]:
-    """DOP853 by given steps, whatever their error."""
+    """DOP853 with given steps, without error control."""
     for a, b in pairwise(times):
         most = 1e6 * (1 + np.abs(y).max())
         found = scipy.integrate.solve_ivp(

@@ -1,7 +1,7 @@
-r"""The saddle point of a mechanical system, M u = f + A^T lambda with A u = g, and what to say where it is singular.
+r"""The saddle point of a mechanical system, M u = f + A^T lambda with A u = g; errors name the cause of a singular one.
 
-Whether something is singular must not depend on units. Pivots and ranks are therefore judged in coordinates of mass 1 and with
-rows of norm 1, to the next power of two; in other units of length, mass and time that is the same matrix but for factors below 2.
+Singularity must not depend on units. Pivots and ranks are therefore judged in coordinates of mass 1 with rows of norm 1, both to
+the nearest power of two: other units of length, mass and time give the same matrix up to factors below 2.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,12 +11,12 @@ import scipy  # its parts, slow to import, when they are used
 
 from discs.arrays import Float, Matrix
 
-SINGULAR = 1e-12  # pivots and ranks below this, relative to the largest, are looked into
+SINGULAR = 1e-12  # pivots and singular values below this, relative to the largest, count as 0
 ASYMMETRY = 1e-10  # of M, relative to the root of both diagonal entries
 
 
 def dense(a: Matrix) -> Float:
-    """An array of what may be sparse."""
+    """A dense or sparse array as a dense one."""
     return a.toarray() if scipy.sparse.issparse(a) else np.asarray(a)
 
 
@@ -34,7 +34,7 @@ def matrix(m: Matrix, a: Matrix) -> Matrix:
 def solve(m: Matrix, a: Matrix, f: Float, g: Float, names: Sequence[str], owners: Sequence[str]) -> tuple[Float, Float]:
     """u (k,) and lambda (c,) of m (k, k), a (c, k), f (k,), g (c,).
 
-    ValueError with what makes them undetermined, by the `names` of coordinates (k,) and the `owners` of rows (c,).
+    ValueError with the cause if they are not determined; it uses the `names` of coordinates (k,) and the `owners` of rows (c,).
     """
     check(m, a, f, g, names, owners)
     whole, right = matrix(m, a), np.concatenate([f, g])
@@ -51,8 +51,8 @@ def solve(m: Matrix, a: Matrix, f: Float, g: Float, names: Sequence[str], owners
 
 
 def check(m: Matrix, a: Matrix, f: Float, g: Float, names: Sequence[str], owners: Sequence[str]) -> None:
-    """ValueError unless all is finite, M symmetric, and positive definite on velocities that A allows."""
-    for what, given in (("M", m), ("A", a), ("the force", f), ("the constraints' side A u =", g)):
+    """ValueError unless all entries are finite and M is symmetric, and positive definite on velocities that A allows."""
+    for what, given in (("M", m), ("A", a), ("the force", f), ("the right side of A u = g", g)):
         entries = given.data if scipy.sparse.issparse(given) else given
         if not np.isfinite(entries).all():
             raise ValueError(f"{what} must be finite; it is not at these q, v")
@@ -105,7 +105,7 @@ def rank(rows: Float) -> int:
 
 
 def explain(m: Matrix, a: Matrix, g: Float, names: Sequence[str], owners: Sequence[str]) -> None:
-    """Raise ValueError with what makes the saddle point singular, part by part of constraints that share coordinates."""
+    """Raise ValueError with the cause of a singular saddle point, found in each set of constraints that share coordinates."""
     d = scales(m, a)
     a = scipy.sparse.diags_array(d[len(names) :]) @ scipy.sparse.csr_array(a) @ scipy.sparse.diags_array(d[: len(names)])
     g = g * d[len(names) :]
@@ -120,10 +120,10 @@ def explain(m: Matrix, a: Matrix, g: Float, names: Sequence[str], owners: Sequen
         theirs = ", ".join(dict.fromkeys(owners[i] for i in rows.tolist()))
         least = np.linalg.lstsq(block, right, rcond=SINGULAR)[0] if block.size else np.zeros(0)
         if np.abs(block @ least - right).max() > 1e-9 * max(np.abs(right).max(), 1e-300):
-            raise ValueError(f"constraints of {theirs} contradict each other: no motion obeys all {len(rows)}; take one away")
+            raise ValueError(f"constraints of {theirs} contradict each other: no motion obeys all {len(rows)}; remove one")
         raise ValueError(
             f"constraints of {theirs} are redundant: {len(rows)} rows of rank {found}, so that multipliers are not determined; "
-            f"take {len(rows) - found} away"
+            f"remove {len(rows) - found}"
         )
     _inertia(m, a, names, d)
 
@@ -171,7 +171,7 @@ def _scaled(whole: Matrix, d: Float) -> Matrix:
 
 
 def _factors(given: Matrix) -> tuple[Float, Callable[[Float], Float]]:
-    """Pivots of a matrix, in size, and what solves with it."""
+    """Absolute pivots of a matrix, and the function that solves with it."""
     if scipy.sparse.issparse(given):
         try:
             factors = scipy.sparse.linalg.splu(given, permc_spec="MMD_AT_PLUS_A")

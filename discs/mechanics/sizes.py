@@ -1,7 +1,7 @@
-r"""Sizes of a motion's quantities in their own units, for tolerances that do not depend on units.
+r"""Sizes of the quantities of a motion, so that tolerances do not depend on units.
 
-A velocity has the size sqrt(2 T/M_kk), T the largest kinetic energy so far; a coordinate the largest displacement so far; a
-charge mu_a of the vakonomic equations sqrt(2 T)/|A_a|, |A_a| the row's norm in coordinates of mass 1.
+The size of a velocity is sqrt(2 T/M_kk) with the largest kinetic energy T so far; of a coordinate, the largest displacement so far;
+of a charge mu_a of the vakonomic equations, sqrt(2 T)/|A_a| with the row's norm |A_a| in coordinates of mass 1.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ TINY = float(np.finfo(float).tiny)
 def units(system: Equations, q: Float) -> Float:
     """1/sqrt(M_kk), (m,): the speed of each coordinate at kinetic energy 1/2.
 
-    Of a coordinate without inertia of its own: the largest that the constraints give it at that energy.
+    For a coordinate without inertia of its own: the largest speed that the constraints allow at that energy.
     """
     mass = system.mass(q)
     diagonal = mass.diagonal()
@@ -30,7 +30,7 @@ def units(system: Equations, q: Float) -> Float:
 
 
 def residual_size(system: Equations, q: Float, v: Float) -> Float:
-    """What A v - b is compared with, (c,): the sum of |A_ik| times the size of v_k, and |b|."""
+    """Scale of A v - b, (c,): the sum of |A_ik| times the size of v_k, and |b|."""
     size = units(system, q) * _norm(system.mass(q), v)
     found: Float = abs(system.constraint(q)) @ np.maximum(size, np.abs(v)) + np.abs(system.drive)
     return found
@@ -47,7 +47,7 @@ class Sizes:
         self.unit = units(system, self.start)
         mass = system.mass(self.start)
         speed, pull = (_norm(mass, z[self.m : 2 * self.m]) for z in (y, rate))
-        time = min(1e-3 * span, speed / pull) if speed and pull else 1e-3 * span  # that the motion takes to change, or less
+        time = min(1e-3 * span, speed / pull) if speed and pull else 1e-3 * span  # a time in which the motion changes, or less
         self.speed = max(speed, pull * time)
         self.shift = np.maximum(self.unit * self.speed * time, TINY)
 

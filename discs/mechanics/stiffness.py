@@ -1,8 +1,9 @@
-r"""Whether an implicit method does better.
+r"""A test for stiffness: whether an implicit method is faster.
 
 Hairer's test: with two stages y_1, y_2 at the end of a step h, h |f(y_1) - f(y_2)|/|y_1 - y_2| estimates h times the largest
 eigenvalue. If it stays above 6.1, the limit of DOP853's stability, in 15 steps (and not below in 6 in a row), the steps are
-limited by stability. Radau is then tried for 24 steps, and taken if the later half gets twice as far for each evaluation.
+limited by stability. Radau is then tried for 24 steps, and taken if the second half of them advances at least
+twice as far per evaluation.
 
 Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.2.
 """
@@ -21,7 +22,7 @@ TRIAL, SCORED = 24, 12
 
 
 class Stiffness:
-    """Counts the steps of a DOP853 that its stability limits."""
+    """Counts the steps of DOP853 that stability limits."""
 
     def __init__(self) -> None:
         self.limited = self.free = self.pause = 0
@@ -46,7 +47,7 @@ class Stiffness:
         return self.limited >= SHOWN
 
     def implicit_step(self, rate: Any, solver: "scipy.integrate.OdeSolver", rtol: float, atol: Float) -> float | None:
-        """A step of Radau from where `solver` is, if Radau gets further for each evaluation of the rate; else None."""
+        """Radau's step length from the state of `solver`, if Radau advances further per evaluation of the rate; else None."""
         self.limited, self.free, self.pause = 0, 0, PAUSE
         first = min(abs(solver.step_size), abs(solver.t_bound - solver.t))
         trial = scipy.integrate.Radau(rate, solver.t, solver.y, solver.t_bound, rtol=rtol, atol=atol, first_step=first)

@@ -1,4 +1,4 @@
-"""Mechanical systems: made from formulas or from parts, given more constraints, and moved in time."""
+"""Mechanical systems: built from formulas or parts, extended by constraints, integrated in time."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -48,7 +48,7 @@ class MechanicalSystem(Equations):
         mass : M (m, m), symmetric, or q -> M.
         potential : q -> V.
         constraint : q -> A (c, m); c may be 0, with no owners.
-        owners : c names, whose constraint each row is.
+        owners : c names, the owner of each row.
         drive, symmetry : as the attributes.
 
         Raises
@@ -117,11 +117,11 @@ class MechanicalSystem(Equations):
         atol: ArrayLike | None = None,
         progress: bool = True,
     ) -> Trajectory:
-        """The motion from q, v at times[0], by SciPy's methods on v. from the saddle point; for small systems.
+        """The motion from q, v at times[0], integrated by SciPy's methods; for small systems.
 
-        Explicit methods bring v, and q where a constraint is that of a position, back to the constraints after each step.
-        `residual` shows how well they are kept. Where constraints become dependent at one moment and the motion is smooth, it
-        goes on: see `discs.mechanics.rank_drops`.
+        Explicit methods project v, and q for constraints on positions, back onto the constraints after each step. `residual` is
+        the remaining error. If constraints become dependent at one moment and the motion is smooth, the integration continues:
+        see `discs.mechanics.rank_drops`.
 
         Parameters
         ----------
@@ -130,21 +130,21 @@ class MechanicalSystem(Equations):
         rtol : tolerance of a step's error, relative to each coordinate.
         mu : (c,), charges at times[0] of the vakonomic motion, see `discs.mechanics.vakonomic`; without them it is nonholonomic.
         method : "DOP853", "RK45", "RK23" (explicit), "Radau", "BDF", "LSODA" (for stiff problems), or "auto": DOP853, and
-            Radau from where the problem is stiff. `Trajectory.stats` tells which.
+            Radau from where the problem is stiff. `Trajectory.stats` names the one used.
         atol : tolerance of a step's error, absolute: a number or one per entry of (q, v) or (q, v, mu). By default 1e-3 rtol of
-            what each quantity reaches.
+            the size of each quantity.
         progress : show a bar after a second.
 
         Raises
         ------
         ValueError : if v does not obey the constraints, naming the worst owner, V is not finite, M not symmetric or not positive,
             and for arrays of a wrong shape.
-        RuntimeError : if the motion cannot be continued, with the time and why.
+        RuntimeError : if the motion cannot be continued, with the time and the cause.
 
         Warns
         -----
-        UserWarning : if energy that is conserved (without drive), or a constraint, is off by over a hundredth; if rtol is out
-            of reach of the formulas' precision.
+        UserWarning : if energy that is conserved (without drive), or a constraint, is off by over 1 %; if the formulas' precision
+            is too low for rtol.
         """
         q, v = self._vectors(q, v)
         charges = None if mu is None else checks.vector("mu", mu, len(self.owners))
@@ -165,7 +165,7 @@ def _of_q(name: str, formula: Callable[[Float], Any]) -> Callable[[Float], Any]:
 
 
 def _shape_of(formula: Formula) -> tuple[int, ...]:
-    """Shape of a formula's value at q = 0; the right one where it has none there."""
+    """Shape of a formula's value at q = 0; the declared one if it has no value there."""
     try:
         formula(np.zeros(formula.size))
     except ShapeError as error:

@@ -1,14 +1,14 @@
-r"""Systems of the nonholonomic literature with known answers, through the same machinery as the discs.
+r"""Systems of the nonholonomic literature with known solutions.
 
 Each function returns a `discs.mechanics.known.Textbook`: a system, an admissible start and, where there is a closed form, the
-motion with its multipliers. All derivations rest on one picture: motion with speed sigma along a direction of angle phi, r. = sigma
-(cos phi, sin phi), has r.. = sigma. (cos phi, sin phi) + sigma phi. (-sin phi, cos phi); the force of constraint gives the second
-part and the forces along the direction the first.
+motion with its multipliers. All derivations use one fact: motion with speed sigma along a direction of angle phi, r. = sigma
+(cos phi, sin phi), has r.. = sigma. (cos phi, sin phi) + sigma phi. (-sin phi, cos phi). The constraint force supplies the second
+term and the forces along the direction the first.
 
 * J. I. Neimark, N. A. Fufaev, Dynamics of Nonholonomic Systems, AMS 1972: knife edge, disc, sleigh;
 * A. M. Bloch, Nonholonomic Mechanics and Control, 2nd ed., Springer 2015, chapter 1: the same, and the particle.
 
-Oscillators that drive one another are in `discs.mechanics.oscillators`.
+Oscillators that drive each other are in `discs.mechanics.oscillators`.
 """
 
 from collections.abc import Callable
@@ -48,8 +48,8 @@ def rolling_disc(
 
         (alpha + m R^2) theta.. = -m R slope sin phi:   theta. = b + c cos phi,   c = m R slope/((alpha + m R^2) Omega).
 
-    The contact moves with speed R theta. along phi + pi/2: on a plane on a circle of radius R omega/Omega; on an incline in
-    cycloids whose mean drift is sideways, R c/2, and not down: what goes down comes up again. The ground's force is lambda =
+    The contact point moves with speed R theta. along phi + pi/2: on a plane along a circle of radius R omega/Omega, on an incline
+    along cycloids whose mean drift, R c/2, is sideways and not downhill. The ground's force is lambda =
     m R (theta.. (-sin phi, cos phi) - Omega theta. (cos phi, sin phi)) - (m slope, 0).
 
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.4. `turn_rate` must not be 0.
@@ -101,7 +101,7 @@ def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_
 
         x = slope/(2 Omega^2) sin^2 Omega t,   y = slope/(2 Omega^2) (Omega t - sin(2 Omega t)/2):
 
-    a cycloid: the blade comes back to its height after every half turn.
+    a cycloid: the blade returns to its height after every half turn.
 
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.6. `turn_rate` must not be 0.
     """
@@ -143,7 +143,8 @@ def chaplygin_sleigh(
 
         u = U tanh tau,   phi. = +-U sqrt(m/J) sech tau,   phi = phi_0 +- sqrt(J/m)/a (gd tau - gd tau_0):
 
-    it ends on a straight line with the centre of mass ahead. lambda = m u phi. I/J; x and y by quadrature of u (cos phi, sin phi).
+    the motion tends to a straight line with the centre of mass ahead. lambda = m u phi. I/J; x and y by quadrature of u (cos phi,
+    sin phi).
 
     Source: Neimark and Fufaev, chapter 3; Bloch, section 1.7. `offset` and `turn_rate` must not be 0.
     """

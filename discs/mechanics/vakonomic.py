@@ -14,11 +14,11 @@ d/dt (M q. + A^T mu) = -grad V + d/dq (mu.A q.) are
     M q.. = -grad V - A^T mu. + G(q, q.) mu,   (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) q._k,
 
 that is G mu = -sum_a mu_a i_q. dA^a. So a vakonomic system is the nonholonomic one (lambda = -mu.) in magnetic fields dA^a, with
-charges mu_a that follow the ground's force, mu. = -lambda. The two agree where G mu does no work on admissible displacements:
+charges mu_a that obey mu. = -lambda. The two agree where G mu does no work on admissible displacements:
 always if the constraint is integrable (dA^a = 0), seldom if it is not. The field does no work on the motion itself,
 q. . G mu = 0, so both conserve the energy.
 
-Initial data: q(0), admissible q.(0), and, for the vakonomic motion only, mu(0), c numbers that no law of mechanics gives. With
+Initial data: q(0), admissible q.(0), and, for the vakonomic motion only, mu(0), c numbers that no law of mechanics determines. With
 mu(0) = 0, or any that `agreeing_multipliers` spans, the initial accelerations agree.
 
 One disc, r. = e theta., e = R J d_1, d_1 = (cos phi, sin phi), F = -dV/dr: put p = m r. + mu, the momentum of r. Then p. = F, and
@@ -27,11 +27,11 @@ as r. has no part along d_1, the only charge that acts is mu.d_1 = p.d_1:
     (I + m R^2) theta.. = F_theta + e.F - R (p.d_1) phi.,   J phi.. = F_phi + R (p.d_1) theta.,   p. = F.
 
 With p = 0 (mu(0) = -m r.) the free disc rolls the same way in both mechanics, for all time (Fernandez and Bloch, J. Phys. A 41,
-2008, 344005). A force makes p, and they part: by t^2 for a general mu(0), by t^3 where the accelerations agree. Discs in a
-`SteeredChain` obey the same equations, each with its own p.
+2008, 344005). A force changes p, and the motions separate: like t^2 for a general mu(0), like t^3 if the accelerations agree. Discs
+in a `SteeredChain` obey the same equations, each with its own p.
 
-The equations are those of `MechanicalSystem.accelerations` and `integrate`, which take mu, for a few discs; `discs.simulate` is for
-many, and nonholonomic.
+`MechanicalSystem.accelerations` and `integrate` take mu and are meant for a few discs. `discs.simulate` is for many discs, and
+nonholonomic only.
 """
 
 from typing import Any
@@ -48,7 +48,7 @@ from discs.mechanics.saddle import dense
 from discs.mechanics.sizes import units
 from discs.problem import Problem
 
-FLAT = 1e-9  # of the terms of G mu: a field that is weaker counts as none
+FLAT = 1e-9  # relative to the terms of G mu: a weaker field counts as zero
 
 
 def solve(
@@ -64,7 +64,7 @@ def solve(
 
     Parameters
     ----------
-    system, q, v, times, mu : as for `MechanicalSystem.integrate`, which this is.
+    system, q, v, times, mu : as for `MechanicalSystem.integrate`, which this calls.
     tol : its rtol. A q. = 0 is an invariant of the equations.
     options : its `method`, `atol`, `progress`.
     """
@@ -72,7 +72,7 @@ def solve(
 
 
 def agreeing_multipliers(system: MechanicalSystem, q: ArrayLike, v: ArrayLike) -> Float:
-    """Basis (c, d) of the mu(0) with which the vakonomic acceleration at q, v is the nonholonomic one: N^T G mu = 0.
+    """Basis (c, d) of the mu(0) for which both mechanics give the same acceleration at q, v: N^T G mu = 0.
 
     N spans the admissible displacements, the null space of A. For a disc that turns or rolls, d = 1 of c = 2: the mu across its
     axle.
@@ -84,7 +84,7 @@ def agreeing_multipliers(system: MechanicalSystem, q: ArrayLike, v: ArrayLike) -
     a = dense(system.constraint(q)) * unit
     norms = np.linalg.norm(a, axis=1)
     field = system.magnetic(q, v) * unit[:, None] / norms
-    # G is the difference of two terms; one of them, A. of the directions of mass 1, tells what counts as 0
+    # G is the difference of two terms; one of them, A. of the directions of mass 1, sets what counts as 0
     slopes = [dense(system.constraint_rate(q, unit * e)) * unit / norms[:, None] for e in np.eye(len(q))]
     size = float(np.max([np.abs(s).max() for s in slopes])) * float(np.linalg.norm(v / unit))
     across = null_space(a).T @ field
@@ -110,7 +110,7 @@ def rolling_disc(
     ----------
     mass, spin_inertia, heading_inertia : m, I about the axle, J about the vertical; > 0.
     radius : R > 0.
-    pull : constant force, as an incline of slope angle gamma gives: m g sin(gamma) down the slope.
+    pull : constant force, for example that of an incline of angle gamma: m g sin(gamma) down the slope.
     spring : stiffness of a spring to the origin, force per length.
 
     Raises

@@ -1,1 +1,1 @@
-"""Pictures, movies and pages of runs."""
+"""Pictures, movies and web pages of runs."""

@@ -1,8 +1,8 @@
-"""Movies of the discs: standing on the plane, with spokes that show the roll, the rod through their centres, and their tracks.
+"""Movies of the discs on the plane, with spokes that show the roll, the rod through their centres, and their tracks.
 
-Seen from far away, in the direction c = (cos e cos a, cos e sin a, sin e) with azimuth a and elevation e, a point p is drawn at
-(p . u, p . v), u = (-sin a, cos a, 0), v = c x u; what has the larger p . c is nearer and drawn later. What moves above the ground
-is one collection, sorted so; the ground is drawn once: a frame takes some hundredths of a second.
+The view is a parallel projection along c = (cos e cos a, cos e sin a, sin e), with azimuth a and elevation e: a point p is drawn at
+(p . u, p . v), u = (-sin a, cos a, 0), v = c x u. Points with a larger p . c are nearer and drawn later. Everything that moves
+above the ground is one sorted collection, and the ground is drawn once, so a frame takes some hundredths of a second.
 """
 
 import os
@@ -44,14 +44,14 @@ def animate(
 
     Parameters
     ----------
-    path : where to; .mp4 (H.264, by the ffmpeg that imageio-ffmpeg brings) or .gif (by Pillow).
-    fps : pictures a second.
-    progress : show a progress bar on anything that takes over a second.
-    radius : to draw the discs with, length. None draws an eighteenth of the rod, and the movie says so: the spokes turn by the true
-        theta, so a disc drawn smaller than it is seems to slide.
-    discs : about so many are drawn, with their tracks, all of fewer than twice as many; the rod is drawn whole.
-    azimuth, elevation : where it is seen from, degrees.
-    size : width and height in pixels, even; 1280 x 720, of a .gif 800 x 450.
+    path : file to write: .mp4 (H.264, by the ffmpeg of imageio-ffmpeg) or .gif (by Pillow).
+    fps : pictures per second.
+    progress : show a progress bar after one second.
+    radius : of the drawn discs, length. None takes an eighteenth of the rod; the movie shows the value. The spokes turn by the true
+        theta, so a disc that is drawn too small appears to slide.
+    discs : approximate number of discs drawn with their tracks; all, if there are fewer than twice as many. The rod is drawn whole.
+    azimuth, elevation : direction of view, degrees.
+    size : width and height in pixels, even; by default 1280 x 720, or 800 x 450 for a .gif.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def animate(
 
     Raises
     ------
-    ValueError : for another kind of file, a folder that is not there, or a number outside its range.
+    ValueError : for another kind of file, a folder that does not exist, or a number outside its range.
     """
     path = Path(path)
     kind = checks.choice("the movie's ending", path.suffix.lower(), KINDS)
@@ -80,7 +80,7 @@ def animate(
 
 
 def _write_mp4(path: Path, pictures: Iterator[Array], fps: float, size: tuple[int, int]) -> None:
-    import imageio_ffmpeg  # looks for its program when imported
+    import imageio_ffmpeg  # its import searches for the program ffmpeg
 
     with closing(imageio_ffmpeg.write_frames(str(path), size, "rgba", fps=fps, quality=8, macro_block_size=2)) as writer:
         writer.send(None)
@@ -92,7 +92,7 @@ def _write_gif(path: Path, pictures: Iterator[Array], fps: float, size: tuple[in
     from PIL import Image
 
     palette = Image.fromarray(begin := next(pictures)).convert("RGB").quantize(64)
-    # all by the same palette, the first too: its own would make white another white
+    # one palette for all pictures, so that white is the same in each
     every = (
         Image.fromarray(p).convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for p in chain([begin], pictures)
     )
@@ -100,7 +100,7 @@ def _write_gif(path: Path, pictures: Iterator[Array], fps: float, size: tuple[in
 
 
 class Stage:
-    """A run seen from one place, ready to be drawn frame by frame; parameters as of `animate`."""
+    """A view of a run that draws single frames; parameters as of `animate`."""
 
     def __init__(
         self,
@@ -115,7 +115,7 @@ class Stage:
         self.shown = geometry.picked(run.s, checks.whole("discs", discs, 1))
         self.size = (checks.whole("width", size[0], 16), checks.whole("height", size[1], 16))
         if self.size[0] % 2 or self.size[1] % 2:
-            raise ValueError(f"size must be even numbers of pixels, as video takes; got {size}")
+            raise ValueError(f"size must be even numbers of pixels, as video formats require; got {size}")
         a, e = np.radians([checks.number("azimuth", azimuth), checks.number("elevation", elevation)])
         self._toward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
         self._screen = np.array([[-np.sin(a), np.cos(a), 0.0], [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]])
@@ -126,7 +126,7 @@ class Stage:
         self._set_up()
 
     def _flat(self, points: Float) -> Float:
-        """Points (..., 3) on the screen, (..., 2)."""
+        """Screen coordinates (..., 2) of points (..., 3)."""
         return np.asarray(points @ self._screen.T)
 
     def _set_up(self) -> None:
@@ -159,7 +159,7 @@ class Stage:
         self._behind = self._canvas.copy_from_bbox(figure.bbox)
 
     def _ground(self, low: Float, high: Float, scale: float) -> LineCollection:
-        """Lines of the plane, at a round spacing."""
+        """Grid lines of the plane, with a round spacing."""
         power = 10 ** np.floor(np.log10(np.max(high - low) / 8))
         step = next(m * power for m in (1, 2, 5, 10) if m * power >= np.max(high - low) / 12)
         low, high = np.floor(low / step) * step, np.ceil(high / step) * step
@@ -196,7 +196,7 @@ class Stage:
         cross = np.stack([hub, tips[:, 1:]], axis=2).reshape(len(at), 6, 3)  # out and back, three times
         mark = np.stack([at, tips[:, 0]], axis=1)
         rod = np.stack([r[self._line[:-1]], r[self._line[1:]]], axis=1)
-        # what lies in one disc is drawn in this order, so it counts as nearer by next to nothing
+        # parts of one disc are drawn in this order: later ones count as slightly nearer
         parts = [(rim(ROUND), at), (cross, at + 1e-9 * self._toward), (mark, at + 2e-9 * self._toward), (rod, rod.mean(axis=1))]
         order = np.argsort(np.concatenate([places @ self._toward for _, places in parts]), kind="stable")
         flat = [outline for points, _ in parts for outline in self._flat(points)]

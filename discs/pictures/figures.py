@@ -1,4 +1,4 @@
-"""Pictures of the discs. Every function draws into the axes it is given, or new ones, and returns them; nothing opens a window."""
+"""Pictures of the discs. Every function draws into given or new axes and returns them; no window opens."""
 
 from collections.abc import Callable, Iterable
 
@@ -23,7 +23,7 @@ def given_or_new(ax: Axes | None, width: float, height: float) -> Axes:
 
 
 def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Axes] | None = None) -> list[Axes]:
-    """What to look at first; the panels asked for, one of `PANELS` each, or all.
+    """Standard panels of a run: the named ones, or all of `PANELS`.
 
     Parameters
     ----------
@@ -47,20 +47,20 @@ def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Ax
     if len(axes) != len(names):
         raise ValueError(f"ax must be one axes for each of the {len(names)} panels; got {len(axes)}")
     if run.t.size < 2:
-        raise ValueError("a picture over time takes at least two frames; got 1")
+        raise ValueError("a picture over time needs at least two frames; got 1")
     for name, one in zip(names, axes, strict=True):
         PANELS[name](run, one)
     return axes
 
 
 def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 9, radius: float | None = None) -> Axes:
-    """The centre line from above at several times, with the discs: bars, each with the tip of its spoke d_3 as seen from above.
+    """The centre line from above at several times. Discs are bars; a dot on each marks the tip of its spoke d_3.
 
     Parameters
     ----------
     instants : number of times.
-    discs : about so many are drawn, all of fewer than twice as many.
-    radius : half the length of a bar; None draws an eighteenth of the rod.
+    discs : approximate number of discs drawn; all, if there are fewer than twice as many.
+    radius : half the length of a bar; None takes an eighteenth of the rod.
     """
     ax = given_or_new(ax, 6.4, 4.8)
     frames = geometry.instants(run, checks.whole("instants", instants, 1))
@@ -84,7 +84,7 @@ def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int 
 
 
 def spacetime(run: Solution, name: str = "omega", ax: Axes | None = None) -> Axes:
-    """theta or omega in colour over (s, t), with contour lines, dashed below zero, that print without colour."""
+    """theta or omega in colour over (s, t); contour lines, dashed below zero, remain readable without colour."""
     ax = given_or_new(ax, 5.4, 4.4)
     values = getattr(run, checks.choice("name", name, ("theta", "omega")))
     reach = np.abs(values).max() or 1.0
@@ -100,7 +100,7 @@ def spacetime(run: Solution, name: str = "omega", ax: Axes | None = None) -> Axe
 
 
 def end_disc(run: Solution, ax: Axes | None = None) -> Axes:
-    """Where the first disc is and how far it has rolled, against time."""
+    """Position and roll angle of the first disc against time."""
     ax = given_or_new(ax, 5.4, 4.0)
     for name, symbol, colour, line in (("x", "x", BLUE, "-"), ("y", "y", ORANGE, "--"), ("theta", "θ", GREEN, "-.")):
         ax.plot(run.t, getattr(run, name)[:, 0], line, color=colour, label=symbol)
@@ -128,7 +128,7 @@ def profiles(run: Solution, name: str = "theta", ax: Axes | None = None, instant
 
 
 def energy_error(run: Solution, ax: Axes | None = None) -> Axes:
-    """Change of the energy against time, relative to that of the start if there is one."""
+    """Change of the energy against time, relative to the initial energy unless that is zero."""
     ax = given_or_new(ax, 5.4, 4.0)
     start = float(run.energy[0])
     ax.plot(run.t, (run.energy - start) / (start or 1.0), color=BLUE)
@@ -151,7 +151,7 @@ ALONG = ("theta", "omega", "profiles")  # over s
 
 
 def vakonomic() -> Figure:
-    """Vakonomic motions beside the nonholonomic one: a disc on an incline, how the two part, a chain of three discs."""
+    """Vakonomic motions beside the nonholonomic one: a disc on an incline, the growth of the difference, a chain of three discs."""
     figure = Figure(figsize=(11.5, 4.3), layout="constrained")
     axes = figure.subplots(1, 3)
     _incline(axes[0], axes[1])
@@ -187,7 +187,7 @@ def _incline(above: Axes, parted: Axes) -> None:
     above.legend(fontsize=8, loc="center right", bbox_to_anchor=(1, 0.62), handlelength=1.5)
     parted.set_xlabel(LABEL["t"])
     parted.set_ylabel("|φ vakonomic − φ nonholonomic|  (rad)")
-    parted.set_title("they part", fontsize="medium")
+    parted.set_title("growth of the difference", fontsize="medium")
     parted.legend(fontsize=8)
     parted.grid(alpha=0.3)
 

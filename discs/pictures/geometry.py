@@ -1,7 +1,7 @@
-"""How discs stand on the plane, for pictures: from what every Solution has, and from a textbook's single disc.
+"""Geometry of discs for pictures, from a Solution or a textbook's single disc.
 
 Disc i touches the plane at r_i = (x_i, y_i) and stands upright. Its axle points along the heading d_1, which is (cos phi, sin phi)
-of discs with a heading of their own and r'/|r'| of the others; it rolls along J d_1 (the paper's (constraintsphi):
+for discs with own headings and r'/|r'| for the others; it rolls along J d_1 (the paper's (constraintsphi):
 r. = R omega J d_1). The spoke that points up at theta = 0 is the paper's director d_3 = cos(theta) e_z + sin(theta) J d_1.
 """
 
@@ -16,11 +16,11 @@ from discs.mechanics import Trajectory
 from discs.running.stats import Stats
 from discs.solution import Solution
 
-TOO_FAR = 0.2  # of the drawn radius: what a point of a rim may be off between two frames
+TOO_FAR = 0.2  # of the drawn radius: largest error of a point of a rim between two frames
 
 
 def is_ring(run: Solution) -> bool:
-    """Whether the last disc is the first one's neighbour: never further from it than two of the longest links of the frame."""
+    """Whether the last disc is the first one's neighbour: in every frame they are within two lengths of the longest link."""
     if run.s.size <= 3:
         return False
     r = np.stack([run.x, run.y])
@@ -31,7 +31,7 @@ def is_ring(run: Solution) -> bool:
 def slopes(run: Solution) -> Float:
     """r', (F, 2, N): as recorded (want "slope"), or by central differences of the positions, one-sided at free ends.
 
-    One disc has no line; its slope is that of a rod that its axle follows.
+    For a single disc it is the direction of the axle.
     """
     if run.slope_x is not None and run.slope_y is not None:
         return np.stack([run.slope_x, run.slope_y], axis=1)
@@ -49,7 +49,7 @@ def axles(run: Solution) -> Float:
     if run.phi is not None:
         return np.stack([np.cos(run.phi), np.sin(run.phi)], axis=1)
     if run.s.size == 1:
-        raise ValueError("one disc has no line that its axle could follow: give its heading phi")
+        raise ValueError("one disc has no centre line to follow: give its heading phi")
     slope = slopes(run)
     length = np.hypot(slope[:, 0], slope[:, 1])[:, None]
     return np.divide(slope, length, out=np.zeros_like(slope), where=length > 0)
@@ -61,7 +61,7 @@ def turn(vectors: Float) -> Float:
 
 
 def picked(s: Float, about: int) -> Int:
-    """Indices of about so many discs to draw: those nearest to equally spaced places, or all of fewer than twice as many."""
+    """Indices of about `about` discs to draw, nearest to equally spaced places; all, if there are fewer than twice as many."""
     if s.size < 2 * about:
         return np.arange(s.size)
     places = np.linspace(s[0], s[-1], about)
@@ -74,9 +74,9 @@ def instants(run: Solution, count: int) -> Int:
 
 
 def drawn_radius(run: Solution, radius: float | None) -> float:
-    """The radius to draw discs with: as given, or an eighteenth of the rod, so that discs as large as the rod hide nothing.
+    """The radius to draw discs with: as given, or an eighteenth of the rod, so that large discs do not hide each other.
 
-    One disc is drawn as large as it is, or, where that is not known or 0, as an eighteenth of the way it goes.
+    A single disc is drawn with its true radius or, if that is unknown or 0, with an eighteenth of the size of its path.
     """
     if radius is not None:
         return checks.number("radius", radius, positive=True)
@@ -96,24 +96,24 @@ def one_disc(path: Trajectory, radius: float) -> Solution:
 
 
 def _radius(run: Solution) -> float | None:
-    """R of all discs, if it is one number and known."""
+    """The common radius R of all discs; None if there is none or it is unknown."""
     told = run.problem.chain.radius if run.problem is not None else _scene(run).get("radius", run.stats.get("radius"))
     return float(np.max(told)) if told is not None and np.ptp(told) == 0 else None
 
 
 def _scene(run: Solution) -> dict[str, Any]:
-    """What a field says of its scene, see `continuum.told`; empty of discs."""
+    """The scene of a field, see `continuum.told`; empty for discs."""
     scene = run.stats.get("scene")
     return scene if isinstance(scene, dict) else {}
 
 
 def off_between_frames(run: Solution, radius: float) -> float:
-    """How far off straight lines between frames draw a point of a rim, at most, in parts of the drawn radius.
+    """Largest error of a point of a rim if frames are interpolated linearly, relative to the drawn radius.
 
-    With the increment D of a quantity between two frames and its rates a, b there times the step, the cubic through all four
-    differs from the straight line by u (1 - u) [(1 - u) (a - D) - u (b - D)], at most a quarter of the larger of |a - D| and
-    |b - D|. Of theta the rates are omega. Positions move along J d_1 with the speed R |h| omega, h of the law of rolling, and not
-    along the axle; without a known R only that they do not is used.
+    Let D be the increment of a quantity between two frames, and a, b its rates at both times the step. The cubic Hermite
+    interpolant differs from the straight line by u (1 - u) [(1 - u) (a - D) - u (b - D)], at most a quarter of the larger of
+    |a - D| and |b - D|. The rate of theta is omega. Positions move along J d_1 with the speed R |h| omega, h of the law of
+    rolling, and not along the axle; if R is unknown, only the latter is used.
     """
     if run.t.size < 2:
         return 0.0

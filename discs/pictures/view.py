@@ -1,13 +1,11 @@
-"""A page to turn and play runs in three dimensions: one file, no network, for a browser or a notebook.
+"""An interactive page that shows runs in three dimensions: one file without network access, for a browser or a notebook.
 
-The page holds three.js, the frames as base64 of 32-bit floats, little-endian, frame after frame, and a script; see
-`discs/pictures/data`.
-Between frames positions and angles are interpolated linearly in time, but where frames are so far apart that this would mislead
-(`geometry.off_between_frames`): then frames are shown one by one, and the page says so.
+The page contains three.js, the frames as base64 of 32-bit floats, little-endian, frame after frame, and a script; see
+`discs/pictures/data`. Between frames positions and angles are interpolated linearly in time. If frames are too far apart for this
+(`geometry.off_between_frames`), frames are shown one by one, and the page says so.
 
-Data cannot become code: every "<" of them is written as an escape, and a content security policy lets the browser run the page's
-two scripts, known by their hashes, and load nothing. The page is ASCII, so that the hashes hold whatever encoding a browser
-presumes.
+Data cannot become code: every "<" in them is escaped, and a content security policy allows only the page's two scripts, given by
+their hashes, and no loading. The page is ASCII, so the hashes are right in every encoding that a browser may assume.
 """
 
 import base64
@@ -32,7 +30,7 @@ from discs.solution import Solution
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A page, shown by a notebook where it is the last line of a cell.
+    """An HTML page; a notebook shows it as the last line of a cell.
 
     Attributes
     ----------
@@ -67,23 +65,23 @@ def view(
     radius: float | None = None,
     discs: int = 65,
 ) -> View:
-    """Make the page of a run: play, scrub, speed, orbit, colour by theta, omega, |r'| or the ground's force, the energy below.
+    """The page of a run: play, scrub, speed, orbit, colour by theta, omega, |r'| or the ground's force, a plot of the energy.
 
     Parameters
     ----------
-    path : where to write it, .html; None writes nothing.
+    path : file to write, .html; None writes nothing.
     beside : another run, shown to the right at the same time and from the same place.
-    titles : one for each run, strings; none takes the method and the number of discs.
-    radius : to draw the discs with, length. None draws an eighteenth of the rod, which the page says: spokes turn by the true
-        theta, so a disc drawn smaller than it is seems to slide.
-    discs : about so many of a run are drawn, all of fewer than twice as many, and the rod through them.
+    titles : strings, one for each run; by default the method and the number of discs.
+    radius : of the drawn discs, length. None takes an eighteenth of the rod; the page shows the value. The spokes turn by the true
+        theta, so a disc that is drawn too small appears to slide.
+    discs : approximate number of discs drawn of each run, with the rod through them; all, if there are fewer than twice as many.
 
     The ground's force can be chosen if both runs recorded it, want=("contact_force",).
 
     Raises
     ------
-    ValueError : for something else beside, another number of titles, a folder that is not there or another kind of file, a run
-        with values that are not finite, or one disc without a heading.
+    ValueError : if `beside` is not a Solution; for a wrong number of titles, a folder that does not exist, another kind of file,
+        values that are not finite, or one disc without a heading.
     """
     if beside is not None and not isinstance(beside, Solution):
         raise ValueError(f"beside must be another Solution; got {type(beside).__name__}")
@@ -126,7 +124,7 @@ def _title(run: Solution) -> str:
 
 
 def _hash(part: str) -> str:
-    """How a content security policy names an inline script or style."""
+    """The name of an inline script or style in a content security policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(part.encode('utf-8')).digest()).decode('ascii')}'"
 
 
@@ -135,12 +133,12 @@ def _data_file(name: str) -> str:
 
 
 def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
-    """What the page needs of a run; arrays (F, n) of the n discs drawn, the axles as unwrapped angles."""
+    """The data of a run for the page; arrays (F, n) of the n drawn discs, axles as unwrapped angles."""
     for name in ("t", "x", "y", "theta", "omega", "energy", "phi"):
         values = getattr(run, name)
         if values is not None and not np.isfinite(values).all():
             frame = int(np.argwhere(~np.isfinite(values))[0, 0])
-            raise ValueError(f"a page shows finite values; {name} is not at frame {frame} of {title!r}: view the frames before it")
+            raise ValueError(f"a page needs finite values; {name} is not at frame {frame} of {title!r}: view the frames before it")
     shown = geometry.picked(run.s, about)
     axle, slope = geometry.axles(run), geometry.slopes(run)
     arrays = {

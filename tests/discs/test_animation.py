@@ -124,7 +124,7 @@ def test_pictures_show_the_motion(run):
         ({"fps": 0}, "fps must be a positive finite number; got 0"),
         ({"radius": 0}, "radius must be a positive finite number; got 0"),
         ({"discs": 0}, "discs must be a whole number of at least 1; got 0"),
-        ({"size": (321, 180)}, r"size must be even numbers of pixels, as video takes; got \(321, 180\)"),
+        ({"size": (321, 180)}, r"size must be even numbers of pixels, as video formats require; got \(321, 180\)"),
         ({"azimuth": np.nan}, "azimuth must be a finite number; got nan"),
     ],
 )

@@ -205,7 +205,7 @@ def test_bad_disc(change, message):
 def test_bad_footprints():
     run = ring(5, 1.0)
     bare = Solution(run.t, run.s, run.x, run.y, run.theta, run.omega, run.energy)
-    with pytest.raises(ValueError, match=r'run must tell the headings: simulate\(..., want=\("slope",\)\)'):
+    with pytest.raises(ValueError, match=r'run must have headings: simulate\(..., want=\("slope",\)\)'):
         footprints_touch(bare, 0.3, 0.1)
     with pytest.raises(ValueError, match=r"radius must be finite and greater than 0; got 0\.0"):
         footprints_touch(run, 0.0, 0.1)

@@ -139,5 +139,5 @@ def test_bad_input(draw, message):
 
 
 def test_one_frame_has_no_first_look():
-    with pytest.raises(ValueError, match="takes at least two frames; got 1"):
+    with pytest.raises(ValueError, match="needs at least two frames; got 1"):
         run_of(frames=1).plot()

@@ -160,7 +160,7 @@ def test_bad_parameters_are_refused():
         textbook.chaplygin_sleigh(1.0, 1.0, 0.0, speed=1.0, turn_rate=1.0)
     with pytest.raises(ValueError, match=r"velocity\[1\] must not be 0"):
         textbook.nonholonomic_particle(1.0, 1.0, y=0.0, velocity=(1.0, 0.0))
-    with pytest.raises(ValueError, match=r"drift must be above 0.*in size for the driver to go round; got 0.1"):
+    with pytest.raises(ValueError, match=r"drift must be above 0.*in size for the driver to rotate; got 0.1"):
         oscillators.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, **START, drift=0.1)
     with pytest.raises(ValueError, match="q must be 3 finite numbers"):
         oscillators.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, q=(1, 2), speed=1.0, drift=3.0)

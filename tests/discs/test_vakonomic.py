@@ -258,8 +258,8 @@ def test_picture(tmp_path):
         ({"v": [1.0, 0.0, 0.0, 0.0]}, "v must obey the constraints; that of disc is off by 1: take consistent_velocity"),
         ({"q": [0.0, 1.0]}, r"q must be 4 finite numbers; got shape \(2,\)"),
         ({"mu": [0.0, 1.0, 2.0]}, r"mu must be 2 finite numbers; got shape \(3,\)"),
-        ({"times": [0.0, 0.0]}, "times must be at least two, increasing"),
-        ({"times": [0.0]}, "times must be at least two, increasing"),
+        ({"times": [0.0, 0.0]}, "times must be at least two, all increasing"),
+        ({"times": [0.0]}, "times must be at least two, all increasing"),
         ({"tol": 0.0}, "rtol must be a positive finite number; got 0"),
     ],
 )

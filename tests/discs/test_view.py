@@ -130,9 +130,9 @@ def test_bad_input(run, change, message):
 def test_what_cannot_be_seen_is_refused(run):
     broken = run.x.copy()
     broken[3, 2] = np.nan
-    with pytest.raises(ValueError, match="a page shows finite values; x is not at frame 3 of '6 discs, midpoint'"):
+    with pytest.raises(ValueError, match="a page needs finite values; x is not at frame 3 of '6 discs, midpoint'"):
         replace(run, x=broken).view()
-    with pytest.raises(ValueError, match="one disc has no line that its axle could follow: give its heading phi"):
+    with pytest.raises(ValueError, match="one disc has no centre line to follow: give its heading phi"):
         replace(single(), phi=None).view()
     with pytest.raises(ValueError, match="one disc has the coordinates x, y, theta, phi; got 3 of them"):
         geometry.one_disc(textbook.knife_edge(1.3, 0.4, slope=0.0, speed=1.0, turn_rate=0.5).integrate([0.0, 1.0]), 0.7)
