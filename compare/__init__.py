@@ -1,4 +1,4 @@
-"""N discs converge to the rod: lumping, N -> infinity, pictures."""
+"""Convergence of N discs to the rod: lumping, studies of N -> infinity, pictures."""
 
 from compare.hardcases.table import Stability, stability
 from compare.lump import lump

@@ -44,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--tol", metavar="TOL", type=float, default=1e-5, help="largest error of the field, length and rad (default: 1e-5)"
     )
-    p.add_argument("--no-limits", action="store_true", help="of the default scene, leave out the discs with headings of their own")
+    p.add_argument("--no-limits", action="store_true", help="skip the discs with own headings (default scene only)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_main_job)
     commands = p.add_subparsers(metavar="COMMAND", title="commands (without one: the comparison above)")
@@ -52,7 +52,9 @@ def parser() -> argparse.ArgumentParser:
         commands.add_parser("precision", help="speed against error beside other integrators", description=precision.__doc__)
     )
     add_stability(commands.add_parser("stability", help="hard cases by every method", description=stability.__doc__))
-    add_trust(commands.add_parser("trust", help="random scenes: whether tolerances are kept", description=trust.__doc__))
+    add_trust(
+        commands.add_parser("trust", help="random scenes: whether errors stay below the tolerances", description=trust.__doc__)
+    )
     add_report(commands.add_parser("report", help="everything on one page", description=report.__doc__))
     return p
 
@@ -60,8 +62,8 @@ def parser() -> argparse.ArgumentParser:
 def add_trust(p: argparse.ArgumentParser) -> None:
     """The options of `trust`."""
     p.add_argument("--out", metavar="DIR", default="out", help="folder for trust.md and trust.csv (default: out)")
-    p.add_argument("--scenes", metavar="M", type=int, default=200, help="how many, their kinds take turns (default: 200)")
-    p.add_argument("--seed", metavar="SEED", type=int, default=0, help="of scenes and tolerances (default: 0)")
+    p.add_argument("--scenes", metavar="M", type=int, default=200, help="number of scenes, of alternating kinds (default: 200)")
+    p.add_argument("--seed", metavar="SEED", type=int, default=0, help="seed of scenes and tolerances (default: 0)")
     p.add_argument("--first", metavar="I", type=int, default=0, help="number of the first scene (default: 0)")
     p.add_argument(
         "--seconds",
@@ -75,17 +77,17 @@ def add_trust(p: argparse.ArgumentParser) -> None:
 
 
 def run_trust(options: argparse.Namespace) -> None:
-    """Run random scenes and write the table; what an interrupted run has found is written too, and the same command goes on."""
+    """Run random scenes and write the table. If interrupted, write the results so far; the same command continues the run."""
     archive = Path(options.out) / "trust.jsonl"
     try:
         found = trust(options.scenes, options.seed, options.first, options.seconds, archive=archive, progress=not options.quiet)
     except KeyboardInterrupt:
         if archive.exists():
             write_trust(gathered(read(archive)), options.out)
-            print(f"interrupted: {options.out} holds what was found; the same command goes on", file=sys.stderr)
+            print(f"interrupted: {options.out} has the results so far; the same command continues the run", file=sys.stderr)
         raise
     write_trust(found, options.out)
-    archive.unlink()  # a later run measures again
+    archive.unlink()  # a later run starts anew
     print(found.summary())
     print(f"\nwritten to {options.out}: trust.md, trust.csv")
 
@@ -145,17 +147,17 @@ def add_stability(p: argparse.ArgumentParser) -> None:
 
 
 def run_stability(options: argparse.Namespace) -> None:
-    """Run the hard cases and write table and picture; what an interrupted run has found is written too, and not lost."""
+    """Run the hard cases, write table and picture. If interrupted, write the results so far; the same command continues."""
     archive = Path(options.out) / "stability.jsonl"
     try:
         found = stability(options.quick, seconds=options.seconds, archive=archive, progress=not options.quiet)
     except KeyboardInterrupt:
         if archive.exists():
             write_stability(kept(archive, options.quick), options.out)
-            print(f"interrupted: {options.out} holds what was found; the same command goes on", file=sys.stderr)
+            print(f"interrupted: {options.out} has the results so far; the same command continues the run", file=sys.stderr)
         raise
     write_stability(found, options.out)
-    archive.unlink()  # a later run measures again
+    archive.unlink()  # a later run starts anew
     print(found.grid(), found.summary(), sep="\n\n")
     print(f"\nwritten to {options.out}: stability.md, stability.csv, stability.png")
 
@@ -169,7 +171,7 @@ def write_stability(found: Stability, out: str) -> None:
 
 
 def run_precision(options: argparse.Namespace) -> None:
-    """Measure speed against error and write table and picture; what an interrupted run has finished goes to files of its own."""
+    """Measure speed against error and write table and picture; an interrupted run writes its results to precision-partial.*."""
     found, name, stopped = WorkPrecision([], {}, {}), "precision", False
     with fresh_files(options.out) as folder:
         scenes = {law: LAWS[law]() for law in options.laws}
@@ -187,7 +189,7 @@ def run_precision(options: argparse.Namespace) -> None:
     print(found.report())
     print(f"\nwritten to {options.out}: {name}.csv, {name}.png, {name}.md")
     if stopped:
-        raise KeyboardInterrupt("interrupted: that is what was finished")
+        raise KeyboardInterrupt("interrupted: these are the results so far")
 
 
 def run_report(options: argparse.Namespace) -> None:
@@ -197,9 +199,9 @@ def run_report(options: argparse.Namespace) -> None:
 
 
 def run_main_job(options: argparse.Namespace) -> None:
-    """Compare discs with the field, and for the default scene show where discs with headings of their own tend."""
+    """Compare discs with the field and, for the default scene, find the limits of discs with own headings."""
     if options.scene and options.rolling:
-        raise ValueError("--rolling belongs to the default scene; a scene file says its own law with the key 'rolling'")
+        raise ValueError("--rolling is for the default scene; a scene file sets its law with the key 'rolling'")
     scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
     with background() as executor:
         studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor)
@@ -211,7 +213,7 @@ def run_main_job(options: argparse.Namespace) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
+    """Run the command line; returns the exit code: 0 done, 1 the motion could not be continued, 2 bad input, 130 interrupted."""
     return command_line.main(parser(), arguments)
 
 

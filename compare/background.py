@@ -1,4 +1,4 @@
-"""Processes beside this one, that end with the work they help: a case that ends its process takes no other with it."""
+"""Worker processes: a call that ends its process fails alone."""
 
 import queue
 import signal
@@ -14,7 +14,7 @@ from typing import Any
 import cloudpickle
 from tqdm import tqdm
 
-LOOK = 1.0  # seconds after which it is looked whether a process that is silent still lives
+LOOK = 1.0  # seconds between checks that a process still exists
 
 
 class Died(RuntimeError):
@@ -26,10 +26,10 @@ class NotStarted(RuntimeError):
 
 
 class Workers(Executor):
-    """As many processes as asked for, each with one call at a time; functions are sent by value where they cannot be imported.
+    """An executor with a given number of processes, one call at a time each; functions that cannot be imported are sent by value.
 
-    A call that ends its process fails alone, with `Died`, which says how; the next one gets a new process. (In a process that had
-    other calls before, what they left behind may have been the cause, so it is called once more in a new one.)
+    A call that ends its process raises `Died` with the cause; the next call gets a new process. If the process had served other
+    calls before, they may have been the cause, so the call is repeated once in a new process.
     """
 
     def __init__(self, processes: int = 1) -> None:
@@ -37,7 +37,7 @@ class Workers(Executor):
         self._most, self._workers, self._threads = processes, list[_Worker](), list[threading.Thread]()
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Have fn(*args, **kwargs) called in one of the processes."""
+        """Call fn(*args, **kwargs) in one of the processes."""
         future: Future[Any] = Future()
         self._calls.put((future, cloudpickle.dumps((fn, args, kwargs))))
         if len(self._workers) < self._most:  # started here, so that an error of starting is raised here
@@ -58,7 +58,7 @@ class Workers(Executor):
                 thread.join()
 
     def _serve(self, worker: "_Worker") -> None:
-        """Give one process its calls, in a thread of this one."""
+        """Send calls to one process, in a thread of this one."""
         while (order := self._calls.get()) is not None:
             future, call = order
             if worker.stopped:
@@ -72,7 +72,7 @@ class Workers(Executor):
 
 
 class _Worker:
-    """A process, and a new one when it has died."""
+    """A process that is replaced when it has died."""
 
     def __init__(self) -> None:
         self.stopped, self._lock = False, threading.Lock()
@@ -90,7 +90,7 @@ class _Worker:
         self._ready = self._used = False
 
     def call(self, call: bytes) -> Any:
-        """What a call gives, or its error."""
+        """Return the value of a call or raise its error."""
         done = self._answer(call)
         if done is None and self._used:
             self._renew()
@@ -124,7 +124,7 @@ class _Worker:
             return None
 
     def _hear(self) -> bytes:
-        """The next word of the process; EOFError if it has died without one. (Its own children may hold its end of the pipe.)"""
+        """The next message of the process; EOFError if it died without one. (Its children may keep its end of the pipe open.)"""
         while not self._ours.poll(LOOK):
             if not self._process.is_alive() and not self._ours.poll():
                 raise EOFError
@@ -136,20 +136,20 @@ class _Worker:
         self._start()
 
     def stop(self) -> None:
-        """End the process at once, for good."""
+        """End the process at once and start no other."""
         with self._lock:
             self.stopped = True
             self._process.kill()
 
     def end(self) -> None:
-        """End the process, which has no call."""
+        """Wait for the end of the process, which has no call."""
         self._ours.close()
         self._process.join()
 
 
 def _work(calls: Connection) -> None:
-    """Answer calls until no more come; what runs in a process."""
-    # interrupts are left to the main process, progress bars locked within this one (a shared lock would leak)
+    """The main function of a process: answer calls until the pipe closes."""
+    # the main process handles interrupts; the lock of progress bars is local, as a shared one would leak
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tqdm.set_lock(threading.RLock())
     with suppress(EOFError, OSError):
@@ -174,7 +174,7 @@ def _answer(call: bytes) -> bytes:
 
 @contextmanager
 def background(processes: int = 1) -> Iterator[Executor]:
-    """An executor of so many processes; what they still do when the block fails is stopped at once."""
+    """An executor of `processes` processes; if the block fails, they are stopped at once."""
     workers = Workers(processes)
     try:
         yield workers

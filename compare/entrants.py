@@ -1,4 +1,4 @@
-"""Who takes part where speed is measured against error: our methods, and the peers that are installed."""
+"""The methods compared in speed against error: ours, and the peers that are installed."""
 
 import time as clock
 from collections.abc import Callable, Sequence
@@ -12,10 +12,10 @@ from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, 
 
 
 def ours(problem: Problem) -> list[Peer]:
-    """Our methods; sweeps stop at a change that falls with the step.
+    """Our methods, with tolerances of the sweeps that fall with the step.
 
-    What is still wrong after the last change is smaller by what one more sweep would gain. The tolerances are chosen for these
-    scenes, as short time for its error goes; "auto" has none that are.
+    The error after the last change is smaller than that change by the gain of one more sweep. The tolerances were chosen for these
+    scenes, for the shortest time at a given error; "auto" has no such tolerances.
     """
     t = problem.duration
 
@@ -35,7 +35,7 @@ def ours(problem: Problem) -> list[Peer]:
         fixed("gauss4", many[:11], lambda m: Gauss4(tolerance=max(0.01 / m**3, 1e-13))),
         fixed("gauss6", many[:15], lambda m: Gauss6(tolerance=max(0.003 / m**3, 1e-13))),
         fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(3e-4 / m**3, 1e-13))),
-        Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all its attempts are counted; the setting is tol"),
+        Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all attempts count; the setting is tol"),
     ]
 
 
@@ -50,9 +50,10 @@ def _outcome(problem: Problem, run: Callable[[], Solution]) -> Outcome:
 
 
 def peers(problem: Problem) -> list[Peer]:
-    """The peers that are installed and can express the problem, at sizes they can bear.
+    """The peers that are installed and can express the problem, at sizes they can handle.
 
-    True curvature is written for those that take the right-hand side or the saddle point from us: SciPy, CVODE, the saddle point.
+    Chains with true curvature run with peers that take the right-hand side or the saddle point from us: SciPy, CVODE, the saddle
+    point.
     """
     f = reduced.Bound(problem)
     n, slaved = problem.chain.n, isinstance(problem.chain, Chain)

@@ -1,4 +1,4 @@
-"""Pictures. Every function draws into the axes it is given, or new ones, and returns them; nothing opens a window."""
+"""Pictures. Every function draws into given or new axes and returns them; no window opens."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,12 +33,12 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
     ax = given_or_new(ax, 6.8, 5.6)
     ax.set_xscale("log")
     if any((s.error > 0).any() for s in studies):
-        ax.set_yscale("log")  # a motion without error, as of a rod at rest, has no logarithm
+        ax.set_yscale("log")  # an error of 0, as of a rod at rest, has no logarithm
     for study, colour in zip(studies, (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         for j, (name, marker, line) in enumerate(zip(study.fields, "os^d", ("-", "--", ":", "-."), strict=False)):
             label = f"{KIND[study.ends]}, {SYMBOL[name]}"
             ax.plot(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
-    # the two slopes, each drawn beside the curves that should follow it
+    # the two slopes, each beside the curves that should have it
     first = [s for s in studies if s.ends == "springs" and s.scene.rod.curvature == "linear"]
     slopes = [(1, s, 1.7) for s in first] + [(2, s, 0.5) for s in studies if s not in first]
     for slope, study, beside in slopes:
@@ -122,14 +122,14 @@ def _stage(ax: Axes3D, middle: Float, reach: float) -> None:
     ax.set_zlim(-0.3 * reach, 0.3 * reach)
     ax.set_box_aspect((1, 1, 0.3), zoom=1.2)
     ax.set_zticks([])
-    ax.set_xlabel("x")  # their unit is told from above: the longer label would be cut off
+    ax.set_xlabel("x")  # without unit, which the view from above shows: a longer label would be cut off
     ax.set_ylabel("y")
     ax.tick_params(labelsize=8, pad=0)
     ax.view_init(elev=35, azim=-65)
 
 
 def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
-    """Energy against time, all runs in the same axes; dotted, the modified energy of a run that has one."""
+    """Energy against time, all runs in the same axes; the modified energy, if recorded, is dotted."""
     ax = given_or_new(ax, 7.6, 4.6)
     for (label, run), colour in zip(runs.items(), (ORANGE, BLUE, GREEN, PURPLE), strict=False):
         ax.plot(run.t, run.energy, color=colour, label=label, linewidth=1)

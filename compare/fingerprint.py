@@ -1,4 +1,4 @@
-"""What a function is, as one number: its code, constants, defaults, closure, and what it takes from its module."""
+"""A hash of a function: of its code, constants, defaults, closure, and the globals that it uses."""
 
 import functools
 import hashlib
@@ -15,41 +15,41 @@ import numpy as np
 
 INSTALLED = [Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib", "purelib", "platlib")]
 IN_CLASSES = ("__dict__", "__weakref__", "__module__", "__doc__", "__firstlineno__", "__static_attributes__", "_abc_impl")
-OURS = ("discs", "continuum", "compare")  # their functions, as installed ones, are told by their names
+OURS = ("discs", "continuum", "compare")  # their functions, like installed ones, are identified by name
 
 
 def fingerprint(function: Callable[..., Any]) -> str:
-    """A number, 32 hexadecimal digits, that two functions share only if they do the same, as far as their own code goes.
+    """A hash of 32 hexadecimal digits, equal for two functions only if their own code and data are equal.
 
-    Followed are nested functions, what the closure holds, and globals that the code names: their values, functions and classes of
-    the user's own modules. What is installed is told by its name. Another version of Python makes another code.
+    It includes nested functions, the closure, and the globals that the code names: values, functions and classes of the user's own
+    modules. Installed modules are identified by name. Another version of Python gives another hash.
 
     Raises
     ------
-    ValueError : if the function holds something that cannot be told apart, as an open file.
+    ValueError : if the function contains something that cannot be identified, as an open file.
     """
-    told = _Told()
+    hashed = _Hashed()
     try:
-        told.add(function)
+        hashed.add(function)
     except RecursionError:
-        raise ValueError("it holds values within values, more than can be followed") from None
-    return told.hash.hexdigest()
+        raise ValueError("it contains too deeply nested values") from None
+    return hashed.hash.hexdigest()
 
 
-class _Told:
-    """Values, one after the other, each by what it is."""
+class _Hashed:
+    """A hash of a sequence of values, each by its content."""
 
     def __init__(self) -> None:
         self.hash = hashlib.blake2b(digest_size=16)
-        self.seen: dict[int, tuple[int, Any]] = {}  # values are kept: their identities stay theirs
+        self.seen: dict[int, tuple[int, Any]] = {}  # values are kept, so that their ids stay unique
 
     def word(self, *words: object) -> None:
         for word in words:
             text = repr(word).encode("utf-8", "surrogatepass")
             self.hash.update(f"{len(text)}:".encode() + text)
 
-    def add(self, value: Any) -> None:
-        """Tell a value."""
+    def add(self, value: object) -> None:
+        """Add a value to the hash."""
         if value is None or value is ... or isinstance(value, (bool, int, float, complex, str, bytes)):
             self.word(type(value).__name__, value)
             return
@@ -122,22 +122,22 @@ class _Told:
                     with suppress(ValueError):  # a descriptor: its name is enough
                         self.add(value)
 
-    def _object(self, value: Any) -> None:
+    def _object(self, value: object) -> None:
         try:
             parts = value.__reduce_ex__(4)
         except Exception as error:
-            raise ValueError(f"it holds {value!r}, which cannot be told apart from others: {error}") from None
+            raise ValueError(f"it contains {value!r}, which cannot be identified: {error}") from None
         if isinstance(parts, str):
             self.word(parts)
             return
         state = parts[2] if len(parts) > 2 else None
-        if isinstance(state, dict):  # whether something has been computed yet makes no difference
+        if isinstance(state, dict):  # values of cached properties make no difference
             state = {k: v for k, v in state.items() if not isinstance(getattr(type(value), k, None), functools.cached_property)}
         self.add([*parts[:2], state, *(list(more) if more is not None else None for more in parts[3:5])])
 
 
 def _names(code: CodeType) -> set[str]:
-    """Names that a code and those nested in it may take from their module."""
+    """Names that a code object, and those nested in it, may take from their module."""
     nested = [_names(constant) for constant in code.co_consts if isinstance(constant, CodeType)]
     return set(code.co_names).union(*nested)
 

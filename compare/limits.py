@@ -1,4 +1,4 @@
-"""Discs with headings of their own: where they tend, and how they differ from the paper's rod."""
+"""Discs with own headings: their limits, and their distance from the paper's rod."""
 
 import csv
 from concurrent.futures import Executor
@@ -55,7 +55,7 @@ def _ends(field: Solution) -> Float:
 
 
 def distances(against: str, family: list[tuple[float, float, float]], other: Solution, tol: float) -> Distances:
-    """Solve steered rods (A, G, J) of a family and measure how far they end from another field."""
+    """Solve steered rods (A, G, J) of a family and measure their distance from another field at the end."""
     end = _ends(other)
     found = [np.abs(_ends(solve(steered_rod(a, g, j), tol, frames=1, progress=False)) - end).max(axis=1) for a, g, j in family]
     a, g, j = np.array(family).T
@@ -63,7 +63,7 @@ def distances(against: str, family: list[tuple[float, float, float]], other: Sol
 
 
 def towards_unit_law(shear: tuple[float, ...] = FAMILY, tol: float = 1e-4) -> Distances:
-    """G -> infinity with J = 1/G and A = 0: the heading has to follow the line, and has no inertia to resist.
+    """G -> infinity with J = 1/G and A = 0: the heading must follow the line, and has no inertia.
 
     The limit is the unit law with true curvature; the distance falls like 1/G.
     """
@@ -72,7 +72,7 @@ def towards_unit_law(shear: tuple[float, ...] = FAMILY, tol: float = 1e-4) -> Di
 
 
 def from_the_paper(tol: float = 1e-3) -> list[Distances]:
-    """How far rods with A = G ends from the paper's two laws: they are different models, and do not tend to them."""
+    """Distances of steered rods from the paper's two laws at the end: the models differ and do not tend to these laws."""
     family = [(0.0, 160.0, 1 / 160), (1.0, 10.0, 0.05), (10.0, 10.0, 0.25), (100.0, 100.0, 0.05)]
     laws = [("field law, the paper's", "field"), ("unit law, the paper's", "unit")]
     return [distances(name, family, solve(untwisting_rod(law), tol, frames=1, progress=False), tol) for name, law in laws]
@@ -82,7 +82,7 @@ def locking(stiffness: tuple[float, ...] = LOCKING, n: int = 33) -> Float:
     """A = G -> infinity at J = 0.05: largest distance that any disc moves in [0, 4.5], for each stiffness, (S,).
 
     A rod that neither stretches nor shears and rolls without sliding moves like a rigid body (the paper's section 3.5); from this
-    rest it has no such motion. The distance falls slowly, like A**(-1/5).
+    initial state it has no such motion. The distance falls slowly, like A**(-1/5).
     """
     reach = []
     for a in stiffness:
@@ -96,7 +96,7 @@ def limits(
 ) -> str:
     """All limits of the steered rod: headings.csv, limits.csv, locking.csv and limits.png in `out`, and the tables as text.
 
-    An executor, if given, runs the convergence study beside the rest.
+    An executor, if given, runs the convergence study in parallel.
     """
     with fresh_files(out) as folder, tqdm(total=4, desc="own headings", unit="limit", delay=1, disable=not progress) as bar:
         beside = executor.submit(convergence, steered_rod(), n, tol=tol, progress=False) if executor else None

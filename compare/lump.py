@@ -16,14 +16,14 @@ def lump(scene: Scene, n: int, ends: str = "springs") -> Problem:
     ----------
     scene : the rod.
     n : number of discs, at least 3 with free ends (4 if consistent) and 5 on a closed rod.
-    ends : "springs", the chain one would build: errors fall like 1/n; "consistent", with the end half-cells' bending
-        and the inner headings' truncation error: like 1/n**2; "paper", "springs" with end discs of full weight. A closed
-        scene makes a ring of discs.
+    ends : "springs", the chain one would build: errors fall like 1/n; "consistent", with the end half-cells' bending and the inner
+        headings' truncation error: errors fall like 1/n**2; "paper", "springs" with end discs of full weight. A closed scene gives
+        a ring of discs.
 
     Returns
     -------
-    The problem. A warning says where the discs are too few to see the initial fields (`continuum.mesh.unseen`), or where the fields
-    jump or are noise, so that more discs come to no limit.
+    The problem. A warning is given if the discs are too few to resolve the initial fields (`continuum.mesh.unseen`), or if the
+    fields have jumps or noise, so that more discs do not converge.
     """
     problem = semidiscretise(scene, n, ends)
     if warning := unseen(scene, problem):

@@ -33,12 +33,12 @@ def overview(
     """Compare a scene's discs with its field; write the table and the pictures to `out`.
 
     Writes convergence.csv, convergence.png, motion.png and energy.png. The energy is shown over 100/3 of the scene's duration,
-    which is [0, 150] for the paper's, and over the duration itself for a closed rod (under the unit law a ring lives no longer).
+    [0, 150] for the paper's, and over the duration itself for a closed rod (under the unit law a ring collapses).
 
     Parameters
     ----------
-    executor : a `concurrent.futures` executor that runs energies and plain springs beside the rest; processes need a scene
-        that can be pickled.
+    executor : a `concurrent.futures` executor that runs energies and plain springs in parallel; processes need a scene that can be
+        pickled.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def overview(
 
 
 def _awaited(future: Future[T], what: str, progress: bool) -> T:
-    """The result of a future, with a clock while it is waited for."""
+    """Wait for the result of a future, with a clock."""
     form = "{desc} {elapsed}"
     with tqdm(desc=what, bar_format=form, delay=1, disable=not progress, leave=False) as bar:
         while not wait([future], timeout=0.5).done:
@@ -81,7 +81,7 @@ def energy_runs(scene: Scene, n: int = 32, progress: bool = False) -> dict[str, 
     step = min(k**2 / 8, suggest_dt(problem, "leapfrog"))
     want = ("modified_energy",) if problem.system.quadratic else ()
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "leapfrog: energy is conserved, but")  # that is what is to be seen
+        warnings.filterwarnings("ignore", "leapfrog: energy is conserved, but")  # the figure shows it
         explicit = simulate(problem, "leapfrog", step, frames=1001, want=want, progress=progress)
     midpoint = simulate(problem, "midpoint", k / 2, frames=1001, progress=progress)
     return {
@@ -91,7 +91,7 @@ def energy_runs(scene: Scene, n: int = 32, progress: bool = False) -> dict[str, 
 
 
 def summary(studies: list[Study]) -> str:
-    """The table of all studies, and what it is measured against."""
+    """The table of all studies, and the field's estimated error."""
     scene, floor = studies[0].scene, max(s.floor for s in studies)
     table = format_table([studies[0].columns, *(row for study in studies for row in study.rows())])
     return (

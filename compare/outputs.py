@@ -1,4 +1,4 @@
-"""Writing results so that nothing half-written is ever left behind."""
+"""Writing results completely or not at all."""
 
 import os
 import tempfile
@@ -9,9 +9,9 @@ from pathlib import Path
 
 @contextmanager
 def fresh_files(out: str | Path) -> Iterator[Path]:
-    """A folder to write into; its files move to `out` when the block ends well, and vanish when it does not.
+    """A temporary folder whose files move to `out` if the block succeeds and are deleted if it fails.
 
-    Raises ValueError at once if `out` cannot be written to.
+    Raises ValueError if `out` cannot be written to.
     """
     target = Path(out)
     made = [p for p in (target, *target.parents) if not p.exists()]
@@ -26,7 +26,7 @@ def fresh_files(out: str | Path) -> Iterator[Path]:
             files = sorted(Path(folder).iterdir())
             for file in files:
                 if (target / file.name).is_dir():
-                    raise ValueError(f"--out holds a folder where a file is to be written: {target / file.name}")
+                    raise ValueError(f"--out contains a folder in place of the file {target / file.name}")
             for file in files:
                 os.replace(file, target / file.name)
     except BaseException:

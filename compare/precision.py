@@ -1,4 +1,4 @@
-"""Speed against error: our methods and what a user would take instead, one problem, one machine, one run."""
+"""Speed against error of our methods and of the alternatives, on the same problem and machine, in one run."""
 
 import time as clock
 import warnings
@@ -19,8 +19,8 @@ from discs import Problem, SimulationError, checks
 from discs.arrays import Float
 
 SIZES = (32, 128, 512, 2048)
-WRONG = 100.0  # a run that says it met a tolerance and is off by this many times more is marked
-FAILURES = (ArithmeticError, SimulationError, RuntimeError, ValueError)  # of a run, that stay in the table
+WRONG = 100.0  # a run whose error is this many times its tolerance is marked
+FAILURES = (ArithmeticError, SimulationError, RuntimeError, ValueError)  # errors of a run that are shown in the table
 
 
 def work_precision(
@@ -35,20 +35,20 @@ def work_precision(
     """Measure speed against error at the end of scenes.
 
     Every method runs from loose to tight settings, once. A run is cut off after `seconds`; after two such runs, or once a method
-    has taken three times that, its tighter settings are left out, and the table says so. (CVODE may crawl at one tolerance and
-    not at the next.) What took less than `seconds`/(4 `repeats`) is then timed in `repeats` rounds, of which the median counts: a
-    round runs all methods and settings, each to warm up and then for the clock. So a machine that slows down for a minute does so
-    for all of them. What took longer runs once more, in the first round, and has the mean of its two times.
+    has taken three times that, its tighter settings are left out, and the table says so. (CVODE may be slow at one tolerance and
+    not at the next.) Runs that took less than `seconds`/(4 `repeats`) are then timed in `repeats` rounds, and the median counts. A
+    round runs all methods and settings, each first to warm up and then timed, so that a slow minute of the machine affects all of
+    them. Longer runs are repeated once, in the first round, and the mean of both times counts.
 
     Parameters
     ----------
     scenes : a scene, or several by name.
     n : numbers of discs, with plain springs at free ends. Chains with true curvature run in NumPy, by every method.
     methods : problem -> methods to run; None takes ours and the peers that are installed.
-    repeats : rounds, how often each short run is timed.
+    repeats : number of rounds.
     seconds : the longest time for one run; three times that for all runs of a method on a problem.
     progress : show a progress bar.
-    into : filled and returned, problem by problem, so that an interrupted run leaves those it has finished; a new one by default.
+    into : filled and returned, problem by problem, so that an interrupted run keeps the finished ones; a new one by default.
 
     Raises
     ------
@@ -89,13 +89,13 @@ class _Entry:
     times: list[float] = field(default_factory=list)
 
     def run_again(self, limit: float) -> None:
-        """To warm up, and for the clock."""
+        """Run twice: to warm up, and timed."""
         with suppress(Cutoff, *FAILURES), _quiet():
             self.peer.run(self.row.setting, limit)
             self.times.append(self.peer.run(self.row.setting, limit).seconds)
 
     def run_once_more(self, limit: float) -> None:
-        """Without warming up; the first run counts too."""
+        """Run once, timed; the first run counts too."""
         self.times.append(self.row.seconds)
         with suppress(Cutoff, *FAILURES), _quiet():
             self.times.append(self.peer.run(self.row.setting, limit).seconds)
@@ -125,7 +125,7 @@ def _first_runs(peer: Peer, blank: Row, exact: Float, limit: float) -> list[_Ent
         try:
             with _quiet():
                 found = peer.run(setting, limit)
-                if not entries:  # what a method loads and compiles at first is not part of its time
+                if not entries:  # loading and compiling are not part of a method's time
                     started = clock.perf_counter()
                     found = peer.run(setting, limit)
         except Cutoff:

@@ -7,7 +7,7 @@ from discs.arrays import Float
 
 
 def reference(problem: Problem) -> tuple[Float, float]:
-    """Positions at the end by "gauss8" with short steps, (rows, n), and what halving them changes."""
+    """Positions at the end by "gauss8" with short steps, (rows, n), and the change when the steps are halved."""
     found = []
     for steps in (1000, 2000) if problem.system.kernel is not None else (250, 500):  # the plain form takes 50 times as long
         run = simulate(problem, Gauss8(tolerance=1e-14, sweeps=20), problem.duration / steps, frames=1, progress=False)

@@ -111,7 +111,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 def report(
     out: str | Path, n: Sequence[int] = SIZES, tol: float = 1e-4, timed: int = 32, long: float = LONG, progress: bool = True
 ) -> None:
-    """Write report.html, which needs nothing beside it, report.md, and every picture and its data.
+    """Write report.html, which contains its pictures, report.md, and every picture and its data.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _motion(page: Page, scenes: dict[str, Scene], fields: dict[str, Solution]) -
 
 
 def _limit(page: Page, studies: dict[str, list[Study]]) -> None:
-    page.add("## N → ∞", "Plain springs lose an order at the free ends; consistent ends win it back.")
+    page.add("## N → ∞", "Plain springs lose an order at the free ends; consistent ends recover it.")
     for law, pair in studies.items():
         rows = [row for study in pair for row in study.rows()]
         page.figure(f"convergence_{law}", figures.convergence(pair), f"Discs against the {law} law's field.", pair[0].columns, rows)

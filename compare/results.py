@@ -27,7 +27,7 @@ class Study:
     ends : kind of ends of the chains.
     n : (S,), numbers of discs.
     k : (S,), spacings, length.
-    error : (S, fields), largest error over the discs of x, y (length), theta and, of own headings, phi (rad).
+    error : (S, fields), largest error over the discs of x, y (length), theta and, for own headings, phi (rad).
     floor : estimated error of the field itself, the largest over the fields.
     dt : time step of the chains.
     """
@@ -100,8 +100,8 @@ class Row(NamedTuple):
     """One method with one setting on one problem.
 
     error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
-    seconds : median of the rounds, or mean of a long run's two times. steps, gradients, solves : what it took, None where a peer
-    does not tell. remark : why there is no result, or what is wrong with it.
+    seconds : median of the rounds, or mean of a long run's two times. steps, gradients, solves : counts, None if a peer has
+    none. remark : why there is no result, or what is wrong with it.
     """
 
     problem: str
@@ -125,7 +125,7 @@ class WorkPrecision:
     ----------
     rows : one for each method, setting and problem, failures included.
     references : (problem, n) -> estimated error of the reference.
-    differences : method -> how it differs from the problem the others solve.
+    differences : method -> how its problem differs from that of the others.
     """
 
     rows: list[Row]
@@ -138,16 +138,15 @@ class WorkPrecision:
         return list(dict.fromkeys((row.problem, row.n) for row in self.rows))
 
     def curve(self, problem: str, n: int, method: str) -> tuple[Float, Float]:
-        """Errors and seconds of a method, from loose to tight, without what is slower and less accurate than another of its
-        runs."""
+        """Errors and seconds of a method, from loose to tight, without runs that are slower and less accurate than another one."""
         found = [(r.error, r.seconds) for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method) and r.error < 1]
         best = [(e, s) for e, s in found if not any(f <= e and t <= s and (f, t) != (e, s) for f, t in found)]
         errors, seconds = np.array(sorted(best, reverse=True)).reshape(-1, 2).T
         return errors, seconds
 
     def time_at(self, error: float, problem: str, n: int, ours: bool) -> tuple[float, str]:
-        """The least time that any method takes to an error (interpolated between its runs, log-log), and its name; infinite if
-        none does."""
+        """The least time in which any method reaches an error (log-log interpolation between its runs), and its name;
+        infinite if none reaches it."""
         best = np.inf, ""
         for method in dict.fromkeys(r.method for r in self.rows if r.ours == ours):
             errors, seconds = self.curve(problem, n, method)
@@ -157,7 +156,7 @@ class WorkPrecision:
         return best
 
     def speedups(self, errors: Iterable[float] = ERRORS) -> str:
-        """How many times faster ours are than the fastest peer at equal error, as a table."""
+        """Ratio of times, fastest peer over ours, at equal error, as a table."""
         lines = ["| problem | N | error | ours | | fastest peer | | times |", "| --- " * 8 + "|"]
         for problem, n in self.problems:
             for error in errors:

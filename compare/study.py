@@ -30,7 +30,7 @@ def convergence(
     ----------
     n : numbers of discs, increasing, at least one.
     ends : see `lump`.
-    field : the scene's `solve(scene, tol)`, computed if not given; its last frame, at the end of the scene, counts.
+    field : the scene's `solve(scene, tol)`, computed if not given; its last frame must be at the end of the scene.
     dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
     method : integrator of the chains.
     """
@@ -47,7 +47,7 @@ def convergence(
     error = np.empty((len(problems), len(fields)))
     bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
-        run = simulate(problem, method, h, frames=1, progress=progress and i == 0)  # the first says that kernels are compiled
+        run = simulate(problem, method, h, frames=1, progress=progress and i == 0)  # the first may report that kernels are compiled
         for j, name in enumerate(fields):
             error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
     floor = max(field.error_estimate[name] for name in fields)

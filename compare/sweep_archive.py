@@ -1,4 +1,4 @@
-"""The archive of a sweep: a line of JSON that says whose it is, and one for each result."""
+"""The archive of a sweep: a line of JSON that identifies its function, and a line for each result."""
 
 import json
 import os
@@ -9,10 +9,10 @@ from discs.files import safe
 
 
 class Result(NamedTuple):
-    """What became of a case.
+    """The result of a case.
 
-    case : as given. value : what the function returned, as JSON holds it (arrays and tuples are lists); None if it failed.
-    error : "" or, if it failed, the kind of error and its message. trace : where it failed. seconds : what it took.
+    case : as given. value : the return value as JSON stores it (arrays and tuples are lists); None if the case failed.
+    error : the kind and message of an error, or "". trace : its traceback. seconds : run time.
     """
 
     case: Any
@@ -23,11 +23,11 @@ class Result(NamedTuple):
 
 
 def key_of(case: Any) -> str:
-    """A case as text, the same for the same; ValueError if JSON cannot hold it."""
+    """A case as text, equal for equal cases; ValueError if JSON cannot store it."""
     try:
         return json.dumps(case, sort_keys=True, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"a case of a sweep must be what JSON can hold; got {case!r}: {error}") from None
+        raise ValueError(f"a case of a sweep must be what JSON can store; got {case!r}: {error}") from None
 
 
 def record(case: Any, value: Any = None, error: str = "", trace: str = "", seconds: float = 0.0) -> str:
@@ -36,7 +36,7 @@ def record(case: Any, value: Any = None, error: str = "", trace: str = "", secon
 
 
 def read(archive: str | Path) -> list[Result]:
-    """The results in an archive, the last for each case; none if there is no file yet. A line that a kill cut short is left out.
+    """The results in an archive, the last for each case; none if there is no file. An incomplete last line is left out.
 
     Raises ValueError if the file is not an archive.
     """
@@ -48,7 +48,7 @@ def read(archive: str | Path) -> list[Result]:
 
 
 def _parsed(path: str | Path, content: bytes) -> tuple[dict[str, str], list[Result], int]:
-    """What an archive says of its function, its results, and how many of its bytes are whole lines."""
+    """The first line of an archive, its results, and the number of its bytes that are complete lines."""
     whole = content.rfind(b"\n") + 1
     try:
         first, *lines = content[:whole].decode().split("\n")[:-1]
@@ -62,13 +62,14 @@ def _parsed(path: str | Path, content: bytes) -> tuple[dict[str, str], list[Resu
 
 
 class Archive:
-    """Whole lines at the end of a file: each is written at once and reaches the disc before the next.
+    """A file to which complete lines are appended; each reaches the disc before the next.
 
-    A file that is no archive, of another function, or in use by another sweep is refused and left as it is; None keeps nothing.
+    A file that is no archive, belongs to another function, or is in use by another sweep is refused and not changed. A path of None
+    stores nothing.
 
     Attributes
     ----------
-    found : the results that are there.
+    found : the results in the file.
     """
 
     def __init__(self, path: str | Path | None, function: str, content: str) -> None:
@@ -81,7 +82,7 @@ class Archive:
         try:
             if not os.path.lexists(self._path) or not self._path.stat().st_size:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                with safe.fresh(self._path) as new:  # never half a first line
+                with safe.fresh(self._path) as new:  # the first line is written completely or not at all
                     new.write(f"{json.dumps(self._of)}\n".encode())
             self._fd = safe.opened(self._path, os.O_RDWR)
         except (OSError, ValueError) as error:
@@ -99,15 +100,15 @@ class Archive:
         with open(os.dup(self._fd), "rb") as file:
             of, self.found, whole = _parsed(path, file.read())
         if of["function"] != self._of["function"]:
-            raise ValueError(f"archive {path} holds results of {of['function']}, not of {self._of['function']}; take another file")
+            raise ValueError(f"archive {path} has results of {of['function']}, not of {self._of['function']}; take another file")
         if of != self._of:
             why = (
                 "has changed since, or Python has"
                 if "content" in of
                 else "may have changed: an earlier version did not keep what it was"
             )
-            raise ValueError(f"archive {path} holds results of {of['function']}, which {why}; take another file")
-        os.ftruncate(self._fd, whole)  # what a kill left of a line
+            raise ValueError(f"archive {path} has results of {of['function']}, which {why}; take another file")
+        os.ftruncate(self._fd, whole)  # removes an incomplete last line
         os.lseek(self._fd, 0, os.SEEK_END)
 
     def write(self, line: str) -> None:
@@ -125,4 +126,4 @@ def _plain(value: Any) -> Any:
     """NumPy's arrays and numbers as lists and numbers."""
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is not something JSON can hold")
+    raise TypeError(f"{type(value).__name__} cannot be stored as JSON")

@@ -1,4 +1,4 @@
-"""The same function for many cases, on all cores or a cluster, kept as it goes: `sweep(function, cases)`."""
+"""`sweep(function, cases)`: one function for many cases, on all cores or a cluster, with an archive of results."""
 
 import json
 import os
@@ -33,20 +33,20 @@ def sweep(
 ) -> list[Result]:
     """Call a function for every case.
 
-    A case that fails is reported and does not hold up the others, even if it ends its process. With an archive each result is
-    written as it arrives, and a sweep that was interrupted or killed takes from it what it has already; what failed is tried again.
+    A case that fails is reported and does not stop the others, even if it ends its process. With an archive each result is written
+    when it arrives, and a repeated call computes only the cases that are missing or have failed.
 
     Parameters
     ----------
     function : takes a case. A lambda, and a function of a notebook or script, is sent to other processes by value. A script that
         calls `sweep` must do so under `if __name__ == "__main__":`.
-    cases : whatever JSON can hold (numbers, strings, lists, dictionaries), all different. What the function returns must be
-        so too; NumPy's arrays and numbers become lists and numbers, whether a result is fresh or from the archive.
+    cases : values that JSON can store (numbers, strings, lists, dictionaries), all different. The same holds for return values;
+        NumPy's arrays and numbers become lists and numbers, in new results as in those from the archive.
     executor : any `concurrent.futures` executor. None: as many processes on this machine as there are cores to use. For a cluster,
-        Dask's: `distributed.Client(address).get_executor()`. Where a case breaks an executor, as it can a ProcessPoolExecutor, the
-        cases that had not ended go on in processes of ours.
-    archive : file that keeps the results, a line of JSON each (NaN and infinities as Python writes them). One file belongs to one
-        function as it is: code, defaults, closure, and what it uses of its module (`compare.fingerprint`). One sweep at a time.
+        Dask's: `distributed.Client(address).get_executor()`. If a case breaks the executor, as it can a ProcessPoolExecutor, the
+        unfinished cases run in processes of ours.
+    archive : file of results, a line of JSON each (NaN and infinities as Python writes them). It belongs to one function with its
+        present code, defaults, closure and globals (`compare.fingerprint`), and to one sweep at a time.
     progress : show a progress bar.
 
     Returns
@@ -55,7 +55,7 @@ def sweep(
 
     Raises
     ------
-    ValueError : for cases that JSON cannot hold or that are there twice, a function that cannot be sent to other processes, an
+    ValueError : for cases that JSON cannot store or that are equal, a function that cannot be sent to other processes, an
         archive of another function or that is none, or one that another sweep writes to.
     """
     cases = list(cases)
@@ -84,18 +84,20 @@ def sweep(
 
 
 def _identity(function: Callable[[Any], Any], archive: str | Path | None) -> tuple[str, str]:
-    """Name of a function, and what it is; the latter is asked only by an archive."""
+    """Name of a function and, for an archive, its fingerprint."""
     name = f"{function.__module__}.{function.__qualname__}" if hasattr(function, "__qualname__") else repr(function)
     if not archive:
         return name, ""
     try:
         return name, fingerprint(function)
     except ValueError as error:
-        raise ValueError(f"an archive must know its function, and cannot know {name}: {error}; put that into the cases") from None
+        raise ValueError(
+            f"an archive must identify its function, and cannot identify {name}: {error}; put that into the cases"
+        ) from None
 
 
 def _call(workers: Executor, function: "_Sent", cases: dict[str, Any], took: Callable[[str, str], None]) -> None:
-    """Call a function for cases by key, and give on the line of each that has ended; those that a broken executor lost are left."""
+    """Call a function for cases by key; `took` gets the line of each that ends. Cases that a broken executor loses are left out."""
     futures: dict[Future[str], str] = {}
     try:
         with suppress(BrokenExecutor):
@@ -111,7 +113,7 @@ def _call(workers: Executor, function: "_Sent", cases: dict[str, Any], took: Cal
 
 
 class _Sent:
-    """A function that is sent to other processes by value where they cannot import it, and made once in each."""
+    """A function that is sent to other processes by value if they cannot import it, and unpickled once in each."""
 
     def __init__(self, function: Callable[[Any], Any]) -> None:
         self.function = function
@@ -140,24 +142,24 @@ def _received(content: bytes) -> Callable[[Any], Any]:
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _attempt(function: Callable[[Any], Any], case: Any) -> str:
-    """The line of a case, made where the function runs. Whatever it raises is its own, as SystemExit."""
+    """The line of a case, made in the process that runs it. All its errors, even SystemExit, are its result."""
     begun = clock.perf_counter()
     try:
         return record(case, function(case), seconds=clock.perf_counter() - begun)
     except BaseException as error:
         here = parent_process() is None and threading.current_thread() is threading.main_thread()
         if here and isinstance(error, KeyboardInterrupt):
-            raise  # it is the user's, of this process
+            raise  # the user interrupts this process
         return record(case, None, _words(error), traceback.format_exc(), clock.perf_counter() - begun)
 
 
 def _line(future: Future[str], case: Any) -> str:
-    """The line of a case that has ended, even if what ran it has not survived."""
+    """The line of a case that has ended, even if its process has died."""
     try:
         return future.result()
     except (NotStarted, BrokenExecutor):

@@ -181,7 +181,7 @@ def failed(error: object, code: int) -> int:
 
 
 def main(parser: argparse.ArgumentParser, arguments: list[str] | None) -> int:
-    """Run a command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
+    """Run a command line; returns the exit code: 0 done, 1 the motion could not be continued, 2 bad input, 130 interrupted."""
     options = parser.parse_args(arguments)
     formatted, warnings.formatwarning = warnings.formatwarning, lambda message, *_: f"warning: {message}\n"
     try:

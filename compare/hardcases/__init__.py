@@ -1,1 +1,1 @@
-"""Hard cases: what each method survives, and where it fails."""
+"""Hard cases: the results and limits of every method."""

@@ -1,4 +1,4 @@
-"""What is hard for a rolling rod, and what is expected of a run: the cases of `compare.stability`."""
+"""The cases of `compare.stability`: hard problems for a rolling rod, and the results expected of each method."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +14,8 @@ from discs import Problem
 class Case:
     """One hard case.
 
-    name : what is hard. setting : at which size. what : why. expectation : see there. run : (method, seconds it may take) -> Found.
+    name : the difficulty. setting : size or parameters. what : its cause. expectation : see `Expectation`. run : (method, seconds
+    that it may take) -> Found.
     """
 
     name: str
@@ -31,7 +32,7 @@ class Case:
 
 
 def cases(quick: bool = False) -> list[Case]:
-    """All cases; the quick ones are small and few."""
+    """All cases; with `quick`, few and small ones."""
     found: list[Case] = []
 
     def add(name: str, setting: str, what: str, expectation: Expectation, run: Callable[..., Found], **more: Any) -> None:
@@ -45,23 +46,23 @@ def cases(quick: bool = False) -> list[Case]:
         for multiple in (1, 8, 64) if quick else (1, 2, 4, 8, 16, 32, 64):
             end = (10.0 if quick else 40.0) * multiple * 4 / (n - 1)
             run = partial(motion, partial(twisted, n, duration=end), step=partial(_times_k, multiple), compared=False)
-            what = "explicit methods need h < 0.6 k²; what is left of an implicit one's promise when h is far above k?"
+            what = "explicit methods need h < 0.6 k²; do implicit ones still conserve the energy when h is far above k?"
             add("step above the explicit limit", f"N = {n}, h = {multiple} k", what, energy, run, methods=(*FIXED, *PEERS))
 
     for time, n in ((150, 33),) if quick else ((150, 33), (150, 129), (150, 513), (1500, 33), (1500, 129), (1500, 513)):
-        words = "energy to 1e-10 where steps converge, and never lost silently"
+        words = "energy to 1e-10 if steps converge, and a warning if it is lost"
         run = partial(motion, partial(twisted, n, duration=float(time)), compared=False)
-        what = "small errors of every step add up, and the motion amplifies differences"
+        what = "small errors of every step add up, and the motion amplifies them"
         add("long time", f"N = {n}, t = {time}", what, exactly(words, energy=1e-10, must=(*CONSERVING, *GAUSS)), run)
 
     for n, t in ((17, 45.0), (33, 45.0), (65, 10.0)) if quick else ((17, 60.0), (33, 60.0), (65, 20.0), (129, 10.0), (257, 5.0)):
         words = "the part of the velocity off the constraint stays below 0.1"
-        what = "the two-step scheme rolls in the mean of two steps only; a mode that flips sign every step is free"
+        what = "the two-step scheme constrains only the mean of two steps; a mode that flips sign every step is free"
         add("parasitic mode", f"N = {n}, t = {t:g}", what, bound(words), partial(parasite, n, t), methods=("leapfrog",))
 
     for rolling in ("field", "unit"):
         for n in (33,) if quick else (33, 129):
-            words = "growth of every wave, to the shortest, within 0.02 of the dispersion relation" + "; none" * (rolling == "unit")
+            words = "growth of all waves within 0.02 of the dispersion relation" + "; none" * (rolling == "unit")
             what = "under the field law all waves grow, up to ω√(β/K); under the unit law none does"
             run = partial(waves, n, rolling, 0.7, 4.0)
             add(
@@ -73,9 +74,9 @@ def cases(quick: bool = False) -> list[Case]:
                 methods=FIXED,
             )
     for n in (17, 33) if quick else (17, 33, 65, 129, 257):
-        words = "said to be ill posed at the start; until then growth as in the dispersion relation, proportional to N"
+        words = "a warning that it is ill posed; growth as in the dispersion relation, proportional to N"
         run = partial(waves, n, "field", 0.0, 20 / n, multiple=0.1)
-        what = "without bending stiffness the rates have no limit for short waves: no method can help"
+        what = "without bending stiffness the growth rates are unbounded for short waves, for any method"
         add(
             "limp rolling rod, field law",
             f"N = {n}",
@@ -86,7 +87,7 @@ def cases(quick: bool = False) -> list[Case]:
         )
 
     for n in (32,) if quick else (32, 128):
-        words = "stops with time and disc before anything is undefined"
+        words = "stops, with time and disc, before anything is undefined"
         what = "the ring of the unit law becomes a point, where r' = 0 has no direction"
         add(
             "collapsing ring, unit law",
@@ -99,7 +100,7 @@ def cases(quick: bool = False) -> list[Case]:
     for turns in (4, 16):
         run = partial(motion, partial(twisted, 65 if quick else 129, twist=float(turns)), note=folding)
         what = "64 and 1024 times the paper's energy: fast, strongly folded"
-        words = "energy to 1e-10; an error above 10 % not without a word"
+        words = "energy to 1e-10; a warning if an error is above 10 %"
         add(
             "strong twist",
             f"{turns} turns, N = {65 if quick else 129}",
@@ -108,24 +109,24 @@ def cases(quick: bool = False) -> list[Case]:
             run,
         )
     for n in (65,) if quick else (65, 513):
-        what = "every wave the chain holds is excited, most far above what a step resolves"
+        what = "all waves of the chain are excited, most of them too fast for the step"
         words = "energy to 1e-10"
         run = partial(motion, partial(rough, n, 4.5), compared=False)
         add("rough random roll", f"N = {n}", what, exactly(words, energy=1e-10), run)
 
     for setting, (scene, keywords) in EXTREMES.items():
-        what = "parameters at their limits: no spin inertia, no torsion, hardly bent or hardly bending, tiny or huge discs"
-        words = "energy to 1e-9; an error above 10 % not without a word"
+        what = "parameters at their limits: no spin inertia, no torsion, very small or large bending stiffness, huge discs"
+        words = "energy to 1e-9; a warning if an error is above 10 %"
         run = partial(motion, partial(lumped, scene, 33, **keywords))
         add("extreme parameters", setting, what, bound(words, energy=1e-9, must=CONSERVING, aloud=True), run)
 
-    # after 7/8 of a period a wrong frequency shows; midpoint, h < t/100, is off by omega^3 h^2 t/12 < 1.4e-3 in phase
+    # after 7/8 of a period a wrong frequency is visible; midpoint, h < t/100, is off by omega^3 h^2 t/12 < 1.4e-3 in phase
     run = partial(motion, partial(twisted, 33, radius=0.0, duration=7.8), exact=torsion_wave)
     words = "the line does not move, and the twist is the exact standing wave to 2e-3; energy to 1e-3"
     still = Expectation("exact", words, energy=1e-3, error=2e-3, must=OURS)
-    add("extreme parameters", "R = 0", "points that cannot roll: a torsion wave is all that is left", still, run)
+    add("extreme parameters", "R = 0", "points that cannot roll: only a torsion wave is left", still, run)
 
-    few = "few discs", "a chain still makes sense as long as there is something to bend"
+    few = "few discs", "a chain needs at least one bend"
     add(few[0], "N = 3", few[1], exactly("energy to 1e-12", energy=1e-12, error=0.1), partial(motion, partial(twisted, 3)))
     two = partial(motion, partial(lumped, "steered_rod", 2))
     add(few[0], "own headings, N = 2", few[1], exactly("energy to 1e-10", energy=1e-10, error=0.1), two)
@@ -135,16 +136,16 @@ def cases(quick: bool = False) -> list[Case]:
 
     for n in (257, 1025) if quick else (257, 1025, 4097, 16_385):
         what = "forces are fourth differences: plain doubles lose 1e-3 at N = 4097"
-        words = "the same motion from elsewhere agrees to 1e-6"
+        words = "the motion moved and turned agrees to 1e-6"
         run = partial(rounding, partial(twisted, n, duration=0.5 if quick else 4.5), 0.01)
         add("rounding", f"N = {n}", what, exactly(words, energy=1e-9, error=1e-6), run, methods=(*FIXED, *PEERS))
 
     run = partial(motion, partial(twisted, 65, duration=9.0, twist=1.0), note=folding)
-    words = "the equations go on: energy to 1e-10 (real discs would touch, see discs.mechanics.contact)"
+    words = "the equations remain valid: energy to 1e-10 (real discs would touch, see discs.mechanics.contact)"
     add(
         "folded line",
         "N = 65, 1 turn, t = 9",
-        "R|κ| exceeds 1: neighbouring discs would cut into each other",
+        "R|κ| exceeds 1: neighbouring discs would overlap",
         exactly(words, energy=1e-10),
         run,
     )

@@ -1,4 +1,4 @@
-"""The problems of hard cases, where they end exactly, and what is measured of them beside energy and positions."""
+"""The problems of hard cases, their exact solutions, and quantities measured besides energy and positions."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,14 +34,14 @@ def lumped(scene: str, n: int, **keywords: Any) -> Problem:
 
 
 def rough(n: int, duration: float) -> Problem:
-    """A straight chain whose discs are turned and rolling at random (seed 1), each on its own."""
+    """A straight chain whose discs have independent random roll angles and rates (seed 1)."""
     problem, rng = twisted(n, duration=duration), np.random.default_rng(1)
     start = State(problem.chain.s, 0.0 * problem.chain.s, 0.5 * rng.standard_normal(n), 0.5 * rng.standard_normal(n))
     return replace(problem, initial=start)
 
 
 def turned(problem: Problem, angle: float, move: tuple[float, float]) -> Problem:
-    """The same motion started elsewhere, in another direction."""
+    """The same problem, turned and moved in the plane."""
     s, c, d = problem.initial, np.cos(angle), np.sin(angle)
     x, y = np.asarray(s.x), np.asarray(s.y)
     return replace(problem, initial=State(c * x - d * y + move[0], d * x + c * y + move[1], s.theta, s.omega))
@@ -55,7 +55,7 @@ def torsion_wave(problem: Problem) -> Float:
 
 
 def folding(problem: Problem, run: Solution) -> str:
-    """The largest R |kappa| of the line, and when it first exceeds 1."""
+    """The largest R |kappa| of the line, and the time when it first exceeds 1."""
     dx, dy = (np.gradient(v, problem.chain.k, axis=1) for v in (run.x, run.y))
     ddx, ddy = (np.diff(v, 2, axis=1) / problem.chain.k**2 for v in (run.x, run.y))
     cross = dx[:, 1:-1] * ddy - dy[:, 1:-1] * ddx
@@ -65,12 +65,12 @@ def folding(problem: Problem, run: Solution) -> str:
     return f"R|κ| up to {worst.max():.2g}{when}"
 
 
-# Cases that are no plain motion
+# Cases with a measurement of their own
 
 
 def rounding(make: Callable[[], Problem], dt: float, method: str, seconds: float) -> Found:
     """Two runs that differ by a rigid motion of the plane, so by rounding only: the error is their largest difference, in length
-    or rad. (Of peers it is their tolerance that shows.)"""
+    or rad. (For peers it shows their tolerance.)"""
     angle, move, problem = 0.7, (1 / 3, -0.2), posed(make)
 
     def end(problem: Problem, seconds: float) -> tuple[Found, Float | None]:
@@ -100,10 +100,10 @@ def rolling_waves(
 
         xi = -i (R omega c/sigma) eta,   R vartheta = (1 - (R omega c/sigma)^2) eta:
 
-    started so, a wave only grows. (Under the unit law eta = R vartheta, and it only oscillates, at the rate Omega.) Its amplitude
-    is A^2 = |xi|^2 + |eta|^2 + R^2 |vartheta|^2 + 2 R^2 |vartheta.|^2/Omega^2, which an oscillation keeps; the rate is the
-    logarithm of the ratio of the largest A in the two halves of the run, over half its time. Waves of 1e-9 feel neither each
-    other nor rounding.
+    a wave with this start only grows. (Under the unit law eta = R vartheta, and it only oscillates, at the rate Omega.) Its
+    amplitude is A^2 = |xi|^2 + |eta|^2 + R^2 |vartheta|^2 + 2 R^2 |vartheta.|^2/Omega^2, which an oscillation conserves; the rate
+    is the logarithm of the ratio of the largest A in the two halves of the run, over half its time. Waves of size 1e-9 are affected
+    neither by each other nor by rounding.
     """
     scene = rolling_rod(rolling=rolling, duration=duration, bending_stiffness=stiffness, radius=0.7, density=1.3, spin_inertia=0.6)
     problem, rod = lump(scene, n), scene.rod
@@ -134,16 +134,16 @@ def rolling_waves(
 
 
 def waves(n: int, rolling: str, stiffness: float, duration: float, method: str, seconds: float, multiple: float = 0.5) -> Found:
-    """The same as a case: the error is the largest of the rates."""
+    """The same as a case: the error is the largest error of a rate."""
     return rolling_waves(n, rolling, stiffness, duration, method, seconds, multiple)[0]
 
 
 def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
-    r"""The paper's scheme at h = k^2/8 with its ends: the share of its half-step velocity v that rolling does not allow.
+    r"""The paper's scheme at h = k^2/8 with its ends: the part of its half-step velocity v that violates rolling.
 
-    Leapfrog asks A(q_n)(q_{n+1} - q_{n-1}) = 0 of central differences only; v = (q_{n+1} - q_n)/h has a part v - C C^T M v off the
-    constraint, of the size of h for a smooth motion. It flips sign every step, and when it grows it takes energy from the motion.
-    The indicator is the root of its kinetic energy over the total; the onset is where it exceeds 0.1.
+    Leapfrog requires A(q_n)(q_{n+1} - q_{n-1}) = 0 of central differences only; v = (q_{n+1} - q_n)/h has a part v - C C^T M v off
+    the constraint, of the size of h for a smooth motion. It flips sign every step, and when it grows it takes energy from the
+    motion. The indicator is the root of its kinetic energy over the total; the onset is where it exceeds 0.1.
     """
     problem = posed(partial(twisted, n, "paper", duration=duration))
     k, system, begun = problem.chain.k, problem.system, processor()
@@ -168,7 +168,7 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
 
 
 def collapse(n: int, method: str, seconds: float) -> Found:
-    """The ring of the unit law past its end: where it stops, and by how much it misses the exact time, in time."""
+    """The ring of the unit law beyond its collapse: the time at which the run stops; its error is that of this time."""
     duration = 1.5
     found = motion(partial(lumped, "breathing_ring", n, rolling="unit", duration=duration), method, seconds, compared=False)
     rod, omega = breathing_ring().rod, 0.4

@@ -1,11 +1,11 @@
-"""How hard cases are run: what is expected of a method, what became of it, ours and peers'."""
+"""Running hard cases: expectations and results, of our methods and of peers."""
 
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
-from time import thread_time as processor  # what else a machine does at the time changes no table
+from time import thread_time as processor  # other programs on the machine do not change it
 from typing import NamedTuple
 
 import numpy as np
@@ -21,21 +21,22 @@ from discs.simulation import LOST
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")
-FIXED = (*CONSERVING, *GAUSS, *EXPLICIT)  # with steps and sweeps of their own: an error to a tolerance hides waves and rounding
+FIXED = (*CONSERVING, *GAUSS, *EXPLICIT)  # methods with a fixed step: a tolerance hides waves and rounding
 OURS = (*FIXED, "auto")
 PEERS = ("SciPy Radau", "SciPy BDF", "SciPy DOP853", "CVODE BDF-5")
 TOL, RTOL = 1e-4, 1e-6  # of "auto", and of the peers
-LOOSE = LOST  # a run is lost when its energy is off by more than this part
+LOOSE = LOST  # a run is lost if its relative error of the energy exceeds this
 FRAMES = 101
 
 
 class Found(NamedTuple):
-    """What became of a run.
+    """The result of a run.
 
-    outcome : "done"; "refused" at the start; "stopped" by a SimulationError; "failed", a peer; "cut off", too slow; "-", not there.
+    outcome : "done"; "refused" at the start; "stopped" by a SimulationError; "failed", a peer; "cut off", too slow; "-", not
+        installed.
     t : time reached. dt : step, NaN if the method chooses. error : largest, relative to the largest value of each of x, y, theta
-    (or as the case says), NaN where nothing is known. energy : largest relative error over the frames, of peers at the end.
-    residual : of rolling, length per time. says : its message, or warnings. note : what else the case measures.
+    (or as the case defines it), NaN if unknown. energy : largest relative error over the frames, of peers at the end.
+    residual : of rolling, length per time. says : its error or warnings. note : other measurements of the case.
     """
 
     outcome: str
@@ -53,16 +54,16 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Expectation:
-    """What must be seen.
+    """The expected result.
 
     kind : "exact", "bound", or "must refuse".
-    words : the same for readers.
+    words : the expectation in words.
     energy : largest relative error of the energy of the methods in `must`; LOOSE for others.
     error : largest error of any method.
-    must : methods of ours that must keep to it. The others may stop, or say that steps did not converge or a warning: what no
-        method may do is to be lost without a word.
-    says : what every run of ours must say, in a warning or an error.
-    aloud : whether `must` is about the energy only, and an error above the bound has to be said by them as by the others.
+    must : methods of ours that must meet it. The others may stop, report unconverged steps, or warn, but may not be lost without
+        a warning.
+    says : text that a warning or error of every run of ours must contain.
+    aloud : whether `must` concerns the energy only, and an error above the bound needs a warning from every method.
     """
 
     kind: str
@@ -74,16 +75,16 @@ class Expectation:
     aloud: bool = False
 
     def verdict(self, method: str, found: Found) -> str:
-        """ "holds", "says so" (off, and not silently), "lost", or the outcome of a run that was not done."""
+        """ "passed", "warned" (wrong, with a warning), "lost", or the outcome of a run that was not done."""
         if found.outcome != "done":
             return found.outcome
         energy = self.energy if method in self.must else LOOSE
         if self.kind != "must refuse" and found.energy <= energy and not found.error > self.error:
-            return "holds"
-        return "says so" if found.says or found.unconverged else "lost"
+            return "passed"
+        return "warned" if found.says or found.unconverged else "lost"
 
     def met(self, method: str, found: Found) -> bool | None:
-        """Whether a method of ours does as expected; None of peers, and where nothing was seen."""
+        """Whether a method of ours meets the expectation; None for peers and runs without a result."""
         verdict = self.verdict(method, found)
         if method not in OURS or verdict in ("cut off", "-"):
             return None
@@ -92,7 +93,7 @@ class Expectation:
         if self.kind == "must refuse":
             return verdict in ("refused", "stopped")
         if method in self.must:
-            return verdict == "holds" or (self.aloud and verdict == "says so" and found.energy <= self.energy)
+            return verdict == "passed" or (self.aloud and verdict == "warned" and found.energy <= self.energy)
         return verdict not in ("lost", "refused")
 
 
@@ -104,7 +105,7 @@ def posed(make: Callable[[], Problem]) -> Problem:
 
 @lru_cache(2)
 def _known(make: Callable[[], Problem], exact: Callable[[Problem], Float] | None) -> Float | None:
-    """Positions at the end: exact ones, or by short steps of "gauss8" where these agree."""
+    """Positions at the end: exact, or by short steps of "gauss8" if these agree."""
     problem = posed(make)
     if exact is not None:
         return exact(problem)
@@ -116,7 +117,7 @@ def _known(make: Callable[[], Problem], exact: Callable[[Problem], Float] | None
 
 
 class Slow(Exception):
-    """A run would take longer than it is given: `seconds`, as foretold."""
+    """A run would exceed its time: `seconds`, as predicted."""
 
     def __init__(self, seconds: float) -> None:
         super().__init__(seconds)
@@ -124,7 +125,7 @@ class Slow(Exception):
 
 
 def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tuple[Found, Solution | None]:
-    """A run of ours; one that is foretold to take longer than `seconds` is not begun, nor a further one of "auto"."""
+    """A run of ours; if it is predicted to take longer than `seconds`, it is not started, nor is a further one of "auto"."""
     begun, times = processor(), np.linspace(0.0, problem.duration, FRAMES)
 
     def spent() -> float:
@@ -134,8 +135,8 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
         start = processor()
         return simulate(problem, integrator, h, frames, progress=False), processor() - start
 
-    def foretold(integrator: str | Integrator, h: float) -> float:
-        """The whole from its beginning: 32 steps, and more until they take a twentieth of a second or are a hundredth of it."""
+    def predicted(integrator: str | Integrator, h: float) -> float:
+        """The predicted time from 32 steps, or more until they take 1/20 s or are 1/100 of all."""
         steps, whole = 32, problem.duration / h
         for attempt in range(20):  # the first may compile kernels
             part = replace(problem, duration=min(steps * h, problem.duration))
@@ -146,7 +147,7 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
         return taken * max(whole / steps, 1.0)
 
     def run(problem: Problem, integrator: str | Integrator, h: float, times: Float) -> Solution:
-        if (expected := foretold(integrator, h)) > seconds - sum(cost):
+        if (expected := predicted(integrator, h)) > seconds - sum(cost):
             raise Slow(expected)
         heard.clear()  # the last run counts, not those that the search for a step began with
         found, taken = timed(problem, integrator, h, times)
@@ -168,7 +169,7 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
             says = _told([*heard, error])
             return Found("stopped", getattr(error, "time", np.nan), dt or np.nan, seconds=spent(), says=says), None
         except Slow as error:
-            return Found("cut off", dt=dt or np.nan, seconds=error.seconds, says="foretold from its beginning, not run"), None
+            return Found("cut off", dt=dt or np.nan, seconds=error.seconds, says="predicted from its first steps, not run"), None
     drift = float(np.abs(done.energy / done.energy[0] - 1).max())
     says = _told(heard)
     slip = float(done.rolling_residual.max()) if done.rolling_residual is not None else np.nan
@@ -182,8 +183,10 @@ def _told(heard: Sequence[warnings.WarningMessage | Exception]) -> str:
 
 
 class Watched(reduced.Bound):
-    """The right-hand side of a peer, that notes the time t it has reached, and gives up a run that is over its time or will be:
-    one that so far was four times too slow at the beginning (a tenth of a second, or a thirtieth of its time), less later."""
+    """The right-hand side of a peer; it records the time t reached and stops a run that exceeds its time or is predicted to.
+
+    The prediction allows an error of a factor 4 at first (after a tenth of a second, or a thirtieth of its time), and less later.
+    """
 
     def __init__(self, problem: Problem, seconds: float) -> None:
         from discs.kernels import driver
@@ -201,7 +204,7 @@ class Watched(reduced.Bound):
 
 
 def peer(problem: Problem, name: str, seconds: float) -> tuple[Found, Float | None]:
-    """A run of a peer, at its tolerance RTOL; the right-hand side is the compiled one for all chains, energy is that at the end."""
+    """A run of a peer at the tolerance RTOL with the compiled right-hand side; the energy is that at the end."""
     if name.startswith("CVODE") and not find_spec("sksundae"):
         return Found("-", says="scikit-sundae is not installed"), None
     system, f = problem.system, Watched(problem, seconds)
@@ -229,7 +232,7 @@ def motion(
     compared: bool = True,
     note: Callable[[Problem, Solution], str] | None = None,
 ) -> Found:
-    """A problem run to its end by a method; `step` is for ours, and for implicit ones only where explicit ones cannot take it."""
+    """A problem run to its end by a method; `step` is the step of our methods."""
     try:
         problem = posed(make)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""What each method survives and where it fails: every hard case by every method, in one table."""
+"""One table of every hard case by every method."""
 
 import csv
 from collections.abc import Iterable
@@ -21,14 +21,14 @@ from compare.results import Growth
 from compare.sweeps import Result, read, sweep
 from discs import checks
 
-SECONDS = {True: 1.0, False: 60.0}  # that a run may take: quick, or not
+SECONDS = {True: 1.0, False: 60.0}  # limit for a run: quick, or not
 PEER_SECONDS = 2.0  # peers are many, and slow
-MARK = {"holds": "holds", "says so": "says so", "lost": "LOST", "refused": "refused", "stopped": "stops", "failed": "fails"}
+MARK = {"lost": "LOST"}
 
 
 class Row(NamedTuple):
-    """One method on one case: see `compare.hardcases.runs.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or "" of
-    peers and where nothing was seen."""
+    """One method on one case: see `compare.hardcases.runs.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or ""
+    for peers and runs without a result."""
 
     case: str
     setting: str
@@ -53,11 +53,11 @@ class Stability:
 
     @property
     def failures(self) -> list[Row]:
-        """What ours did not do as expected."""
+        """Runs of ours that did not meet the expectation."""
         return [row for row in self.rows if row.expected == "NO"]
 
     def grid(self) -> str:
-        """Cases by methods, as a table in Markdown; bold is what ours did not do as expected."""
+        """Cases by methods, as a table in Markdown; bold marks failures of ours."""
         at = {(row.case, row.setting, row.method): row for row in self.rows}
         methods = [m for m in (*OURS, *PEERS) if any(row.method == m for row in self.rows)]
         lines = [f"| case | {' | '.join(methods)} |", "| --- " * (len(methods) + 1) + "|"]
@@ -88,7 +88,7 @@ class Stability:
         return "\n".join(lines)
 
     def summary(self) -> str:
-        """What ours did not do as expected, in lines of Markdown."""
+        """Failures of ours, in lines of Markdown."""
         told = [r for r in self.rows if r.expected]
         lines = [f"{len(told)} runs of ours, {len(self.failures)} not as expected{':' if self.failures else '.'}"]
         for row in self.failures:
@@ -100,15 +100,15 @@ class Stability:
 
     @property
     def words(self) -> str:
-        """What the words of the grid mean."""
+        """Meaning of the words in the grid."""
         return (
-            "holds: to the end, energy (the number, relative) and where known positions within the bound. says so: off, with steps "
-            "counted as unconverged or a warning. **LOST**: off, without a word. stops, refused: an error with time and disc, or "
-            "before the start. fails: a peer's error. cut off: would take longer than it is given, as foretold from its beginning. "
-            "†: some steps did not converge, and are counted. ·: not run, as it would tell nothing: a tolerance hides waves and "
-            "rounding, and the parasitic mode is the two-step scheme's own. Bold: not as expected of ours. "
-            f"auto runs to {TOL:g}, peers to rtol {RTOL:g}, their energy is that at the end; they keep rolling by their variables. "
-            "Seconds are a processor's."
+            "passed: ran to the end; energy (relative error shown) and, where known, positions within the bound. warned: outside "
+            "the bound, with a warning or unconverged steps. **LOST**: outside the bound, without a warning. stopped: an error "
+            "with time and disc. refused: an error before the start. failed: a peer's error. cut off: predicted to exceed its "
+            "time. †: some steps did not converge. ·: not run, as the case does not apply: a tolerance hides waves and rounding, "
+            "and the parasitic mode belongs to the two-step scheme. Bold: a method of ours that did not meet the expectation. "
+            f"auto runs to {TOL:g}, peers to rtol {RTOL:g}; the energy of peers is that at the end, and their variables "
+            "satisfy rolling exactly. Seconds are processor time."
         )
 
     def report(self) -> str:
@@ -164,8 +164,8 @@ def stability(
     quick : small cases only, less than a minute.
     names : of the cases, as `compare.hardcases.cases` has them; all by default.
     methods : names of ours and of peers; all by default.
-    seconds : of a processor; a run that is foretold to take longer is cut off; 60, or 1 if quick. Peers are given 2 at most.
-    executor : as for `sweep`; by default one process beside this one, so that times mean something.
+    seconds : limit of processor time; a run that is predicted to take longer is cut off; 60, or 1 if quick. At most 2 for peers.
+    executor : as for `sweep`; by default one other process, so that times are comparable.
     archive : file to keep results in, and to resume from.
     progress : show a progress bar.
 
@@ -185,7 +185,7 @@ def stability(
 
 
 def kept(archive: str | Path, quick: bool) -> Stability:
-    """What an interrupted run has left in its archive."""
+    """The results of an interrupted run, from its archive."""
     found = [result for result in read(archive) if result.case["quick"] == quick]
     return tabulated(found, cases(quick))
 
@@ -212,15 +212,15 @@ def _listed(quick: bool) -> dict[str, Case]:
 
 
 def _run(order: dict[str, Any]) -> dict[str, Any]:
-    """A run, in whatever process; cases are found by their names, as they cannot be sent as JSON."""
+    """Run a case in any process; it is found by its name, as JSON cannot store it."""
     return _listed(order["quick"])[order["case"]].run(order["method"], order["seconds"])._asdict()
 
 
 def _wanted(case: Case) -> str:
-    """What is expected, and of whom."""
+    """The expectation of a case, and the methods that must meet it."""
     e = case.expectation
     everyone = e.kind == "must refuse" or set(case.methods) & set(OURS) <= set(e.must)
-    who = "all of ours" if everyone else "; ".join(filter(None, (", ".join(e.must), "no other lost without a word")))
+    who = "all of ours" if everyone else "; ".join(filter(None, (", ".join(e.must), "no other lost without a warning")))
     return f"* **{case.name}**: {case.what}{'' if case.what.endswith('?') else '.'} {e.kind.capitalize()} ({who}): {e.words}."
 
 
@@ -234,7 +234,7 @@ def _short(value: float) -> str:
 
 
 def _cell(row: Row | None) -> str:
-    """A verdict and the number that goes with it."""
+    """A verdict and its number."""
     if row is None:
         return "·"
     f, word = row.found, MARK.get(row.verdict, row.verdict)

@@ -1,1 +1,1 @@
-"""Other programs that solve the same problems, each an optional extra (`pip install rolling-discs[peers]`)."""
+"""Peers: other programs that solve the same problems, all optional (`pip install rolling-discs[peers]`)."""

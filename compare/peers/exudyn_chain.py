@@ -1,11 +1,11 @@
-"""The chain of discs with their own headings in Exudyn: rigid wheels on a plane, its own rolling joint, its own beam.
+"""The chain of discs with own headings in Exudyn: rigid wheels on a plane, with Exudyn's rolling joint and beam.
 
-Nothing of `discs.chains.steered` is used for the motion. A disc is a rigid body of six coordinates that `ObjectJointRollingDisc`
-lets roll on the plane, by three Lagrange multipliers at velocity level, and that one more holds upright. A massless fork sits on
-each axle, a planar frame (x, y, phi) that follows the wheel and does not roll. Between forks `ObjectBeamGeometricallyExact2D`, a
-planar Simo-Reissner beam of two nodes and one point of integration, has exactly the stretch, shear and bending of a link; a linear
-spring between rolls is its torsion. Exudyn's implicit trapezoidal rule or generalised alpha integrates: 9 coordinates and 7
-multipliers a disc, all compiled.
+The motion uses nothing of `discs.chains.steered`. A disc is a rigid body with six coordinates. `ObjectJointRollingDisc` lets it
+roll on the plane, by three Lagrange multipliers at velocity level; a fourth multiplier holds it upright. On each axle is a massless
+fork, a planar body (x, y, phi) that follows the wheel and does not roll. Between forks `ObjectBeamGeometricallyExact2D`, a planar
+Simo-Reissner beam of two nodes and one point of integration, has exactly the stretch, shear and bending of a link; a linear spring
+between rolls is its torsion. Exudyn's implicit trapezoidal rule or generalised alpha integrates: 9 coordinates and 7 multipliers a
+disc, all compiled.
 
 Axes: Exudyn's X is up, its (Y, Z) are our (x, y). Then Rot_X Rot_Y Rot_Z, the angles of `NodeRigidBodyRxyz`, are heading, lean and
 roll, each a coordinate of its own: the roll never wraps, and the angles are singular only at a lean of 90 degrees.
@@ -60,7 +60,7 @@ def exudyn_steered(problem: Problem, dt: float, frames: int = 2, spectral_radius
     mbs = container.AddSystem()
     sensors = _build(mbs, chain, problem.initial)
     mbs.Assemble()
-    # not mbs.SolveDynamic, which prints what failed; Any, as the stub of SolveSystem lacks self
+    # not mbs.SolveDynamic, which prints errors; Any, as the stub of SolveSystem lacks self
     solver: Any = exu.MainSolverImplicitSecondOrder()
     if not solver.SolveSystem(mbs, _settings(problem.duration, steps, frames, spectral_radius)):
         raise RuntimeError(f"Exudyn's solver failed at time {solver.it.currentTime:g}; take a smaller dt")
@@ -102,7 +102,7 @@ def exudyn_steered(problem: Problem, dt: float, frames: int = 2, spectral_radius
 
 
 def exudyn_steered_peer(problem: Problem) -> Peer:
-    """The chain as a peer in speed against error: `exudyn_steered` with more and more steps."""
+    """The chain as a peer in speed against error: `exudyn_steered` with increasing numbers of steps."""
 
     def run(setting: float, seconds: float) -> Outcome:
         found = exudyn_steered(problem, problem.duration / setting)
@@ -135,7 +135,7 @@ def _build(mbs: exu.MainSystem, chain: SteeredChain, initial: State) -> list[tup
                 initialVelocities=[0, x_rate[i], y_rate[i], phi_rate[i], 0, -omega[i]],
             )
         )
-        # round about the axle, so that the heading inertia does not depend on the roll
+        # symmetric about the axle, so that the heading inertia does not depend on the roll
         body = mbs.AddObject(items.ObjectRigidBody(mass=mass[i], inertia=[turn[i], turn[i], spin[i], 0, 0, 0], nodeNumber=wheel))
         touch = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=body))
         mbs.AddObject(
@@ -186,7 +186,7 @@ def _settings(duration: float, steps: int, frames: int, spectral_radius: float |
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = duration / (frames - 1)
     settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-    settings.linearSolver.reuseAnalyzedPattern = True  # who couples to whom never changes; a fifth faster
+    settings.linearSolver.reuseAnalyzedPattern = True  # the sparsity is constant; a fifth faster
     integration = settings.timeIntegration
     integration.endTime = duration
     integration.numberOfSteps = steps

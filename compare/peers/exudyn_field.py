@@ -1,6 +1,6 @@
-r"""The chain with slaved headings in Exudyn, with its multipliers: a peer of order 2 that takes equal steps.
+r"""The chain with slaved headings in Exudyn, with its multipliers: a peer of order 2 with equal steps.
 
-Nothing of the reduced equations of `discs.chains.slaved` is used for the motion. Exudyn gets
+The motion uses nothing of the reduced equations of `discs.chains.slaved`. Exudyn gets
 
     M v. + K q = f + A(q)^T lambda,   A(q) v = 0,   q. = v,
 
@@ -9,16 +9,16 @@ with q = (x_i, y_i, theta_i) disc by disc:
 * M and K : an `ObjectGenericODE2` over all discs. M, diagonal, holds the discs' inertia, K is the constant Hessian of V; both are
   sparse and compiled. f is not zero on a ring closed up to a shift only.
 * A(q) : the rows x_i. - e_x,i theta_i. and y_i. - e_y,i theta_i., two for each disc. An `ObjectConnectorCoordinateVector` with
-  velocityLevel=True takes the left side A(q) v and its derivative by v, which is A(q), from user functions. Its matrices alone
-  would not do: they multiply v and the squares of v, and nothing multiplies a position with a velocity.
+  velocityLevel=True takes the left side A(q) v and its derivative by v, which is A(q), from user functions. Its constant
+  matrices are not enough: they multiply v and the squares of v, but not a position with a velocity.
 
 The contact directions e of both laws of rolling come from the slopes r', a fixed combination of positions. A disc's rows of A have
 entries in the disc's own columns only, so discs are taken in blocks, each with a node and a connector: a user function's matrix
 must be dense, and one for the whole chain costs n**2. A block reads the positions of its neighbours from the system's state.
 
-Exudyn's implicit trapezoidal rule, index 2, fulfils A(q) v = 0 at the end of every step. Its Newton matrix has no derivatives of A:
-the user functions have no place for them. The iteration therefore converges linearly. It is asked for residuals no smaller than
-the rounding of K q, which grows like n**3: else it fails from n = 256 on.
+Exudyn's implicit trapezoidal rule, index 2, satisfies A(q) v = 0 at the end of every step. Its Newton matrix has no derivatives of
+A, which the user functions cannot provide, so the iteration converges linearly. Its tolerance is not below the rounding of K q,
+which grows like n**3; otherwise it fails from n = 256 on.
 """
 
 import time as clock
@@ -35,7 +35,7 @@ from discs.arrays import Float
 from discs.chains import stencils
 
 STEPS = (45.0, 90.0, 180.0, 360.0, 720.0)
-BLOCK = 16  # discs that share a node and a connector; fewer are more calls of Python, more are larger dense matrices
+BLOCK = 16  # discs that share a node and a connector: fewer mean more calls of Python, more mean larger dense matrices
 
 
 def exudyn_field_peer(problem: Problem) -> Peer:
@@ -47,8 +47,8 @@ def exudyn_field_peer(problem: Problem) -> Peer:
 
     Returns
     -------
-    Peer whose settings are numbers of steps, and whose solves are iterations of Newton's method. Its run raises `Cutoff` if out of
-    time, ArithmeticError if Newton's method fails.
+    Peer whose settings are numbers of steps, and whose solves are iterations of Newton's method. Its run raises `Cutoff` if its
+    time is up, ArithmeticError if Newton's method fails.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def _build(mbs: Any, problem: Problem) -> float:
         mbs.AddObject(
             items.ObjectConnectorCoordinateVector(
                 markerNumbers=[ground, marker],
-                scalingMarker0=np.zeros((2 * len(own), 1)),  # tells the number of rows only
+                scalingMarker0=np.zeros((2 * len(own), 1)),  # sets the number of rows only
                 velocityLevel=True,
                 constraintUserFunction=rolling.value,
                 jacobianUserFunction=rolling.matrix,
@@ -141,7 +141,7 @@ class _Rolling:
     """
 
     def __init__(self, mbs: Any, slope: Float, offset: Float, radius: Float, near: Float, unit: bool) -> None:
-        self._state = mbs.systemData.GetODE2Coordinates  # of the iterate at hand, which is the current configuration
+        self._state = mbs.systemData.GetODE2Coordinates  # of the present iterate, which is the current configuration
         self._slope, self._offset, self._radius, self._unit = slope.T.copy(), offset, radius, unit
         self._near = 3 * near + np.arange(2)[:, None]
         size, disc = len(radius), np.arange(len(radius))
@@ -187,7 +187,7 @@ def _settings(duration: float, steps: int, rounding: float) -> exu.SimulationSet
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
     settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-    settings.linearSolver.reuseAnalyzedPattern = True  # who couples to whom never changes
+    settings.linearSolver.reuseAnalyzedPattern = True  # the sparsity is constant
     integration = settings.timeIntegration
     integration.verboseMode = 0
     integration.endTime = duration

@@ -1,4 +1,4 @@
-"""diffrax as a peer: its right-hand side is written in JAX, as it takes no compiled function."""
+"""diffrax as a peer, with the right-hand side in JAX, as it accepts no compiled function."""
 
 import time as clock
 from collections.abc import Callable
@@ -11,8 +11,7 @@ from discs import Chain, Problem
 
 
 def diffrax_peers(problem: Problem) -> list[Peer]:
-    """diffrax on the reduced equations, written for it in JAX (it takes no compiled function), in double precision; free ends
-    only."""
+    """diffrax on the reduced equations, written in JAX in double precision; free ends only."""
     import diffrax
     import jax
     import jax.numpy as jnp
@@ -42,7 +41,7 @@ def diffrax_peers(problem: Problem) -> list[Peer]:
             )
 
         def run(tol: float, seconds: float) -> Outcome:
-            part = problem.duration / 100  # compiled code cannot be interrupted: what a part takes foretells the whole
+            part = problem.duration / 100  # compiled code cannot be interrupted: the time of a part predicts the whole
             solve(tol, part).ys.block_until_ready()
             begun = clock.perf_counter()
             solve(tol, part).ys.block_until_ready()

@@ -1,32 +1,33 @@
-"""Chains of discs in MuJoCo, where nothing but friction makes a disc roll.
+"""Chains of discs in MuJoCo, where only friction makes a disc roll.
 
 A disc is a body with five joints, in this order: slides along x, y and z, a hinge about the vertical (heading phi) and a hinge
-about the axle, which the heading turns (roll theta; its axis is -d_1, so that a positive roll goes along J d_1). It has no joint
-to lean with, so it stays upright; each disc is a tree of its own, and MuJoCo knows of no constraint but N contacts with a plane.
-Weight makes the normal force and each disc stands as deep in the plane as the soft contact carries it at rest, so that none
-bounces. Mass, spin and heading inertia are `system.weights`; a rigid body has no axial moment beyond the sum of the other two,
-what the spin inertia has above that is the joint's `armature`. Both are exact for a body that turns about the vertical and its
-axle only. The springs are generalised forces, `qfrc_applied` = -grad V at every step, by the compiled kernel of this repository:
-all the rest of a step is MuJoCo's.
+about the axle, which the heading turns (roll theta; its axis is -d_1, so that a positive roll goes along J d_1). It has no joint to
+lean with, so it stays upright. Each disc is a tree of its own, and the only constraints in MuJoCo are N contacts with a plane.
+Weight gives the normal force. Each disc starts at the depth where the soft contact carries it at rest, so that none bounces. Mass,
+spin and heading inertia are `system.weights`; a rigid body has no axial moment above the sum of the other two, so the rest of the
+spin inertia is the joint's `armature`. Both are exact for a body that turns about the vertical and its axle only. The springs are
+generalised forces, `qfrc_applied` = -grad V at every step, by the compiled kernel of this repository; everything else in a step is
+MuJoCo's.
 
-The geom is a sphere about the axle's middle. It touches at one point right below, as a thin disc does. A cylinder is worse: it
-touches at both rims, and friction of two points resists turning, which the model's disc is free to do. Contacts have dimension 3
-(no friction against turning or rolling), elliptic cones, coefficient `MU`, which no force here reaches, and friction stiffer than
+The geom is a sphere about the middle of the axle. It touches at one point right below, as a thin disc does. A cylinder touches at
+both rims, and friction at two points resists turning, which the model's disc is free to do. Contacts have dimension 3
+(no friction against turning or rolling), elliptic cones, coefficient `MU`, so large that no disc slips, and friction stiffer than
 the normal by `STIFFER` (impratio), so that creep, mobility R_t = (1 - d)/(d m STIFFER) at impedance d, is below other errors.
 
-The contact's law: MuJoCo asks J v. = -b J v of the slip J v, takes J and F at the start of a step and leaves out J. v, and its
-Euler's method is v_{n+1} = v_n + h v., q_{n+1} = q_n + h v_{n+1}. By the choice of b, with springs and start the same:
+The law of contact: MuJoCo requires J v. = -b J v for the slip J v, with J and F at the start of a step and without J. v. Its Euler
+method is v_{n+1} = v_n + h v., q_{n+1} = q_n + h v_{n+1}. The choice of b gives two methods:
 
 * b = 1/h: J(q_n) v_{n+1} = 0. Slip is damped out in one step. First order.
-* b = 2/h: J(q_n) (v_{n+1} + v_n) = 0, and with half a kick to start the rates are those of half steps: the leapfrog scheme with
-  its constraint on the mean, q_{n+1} - 2 q_n + q_{n-1} = h^2 M^-1 (F + J^T lambda), J(q_n) (q_{n+1} - q_{n-1}) = 0. Second order,
-  explicit. Twice the damping that MuJoCo lets pass by itself (its flag refsafe), and slip of a half step is reflected, not damped.
+* b = 2/h: J(q_n) (v_{n+1} + v_n) = 0, and with half a kick to start the rates are those of half steps: the leapfrog scheme with its
+  constraint on the mean, q_{n+1} - 2 q_n + q_{n-1} = h^2 M^-1 (F + J^T lambda), J(q_n) (q_{n+1} - q_{n-1}) = 0. Second order,
+  explicit. The damping is twice what MuJoCo accepts by default (its flag refsafe), and slip of a half step is reflected, not
+  damped.
 
-MuJoCo's Runge-Kutta does not help: b is bounded by about 1/h for it too, and the J. v left out makes a slip of J. v/b.
+MuJoCo's Runge-Kutta is not better: b is bounded by about 1/h for it too, and the missing J. v gives a slip of J. v/b.
 
-Headings that follow the line (`Chain` with rolling "unit") are no coordinates: each step starts by turning every disc along its
-line, at no rate. Friction right below the axle has no moment about the vertical, so nothing else turns a disc. A rolling direction
-that depends on the neighbours puts no force on them, in Lagrange-d'Alembert's principle as here. Rolling "field" is not expressed:
+Headings that follow the line (`Chain` with rolling "unit") are no coordinates: each step first turns every disc along its line, at
+rate 0. Friction right below the axle has no moment about the vertical, so nothing else turns a disc. A rolling direction that
+depends on the neighbours puts no force on them, in Lagrange-d'Alembert's principle as here. Rolling "field" cannot be expressed:
 its wheels have no fixed radius.
 """
 
@@ -54,12 +55,12 @@ def mujoco_peer(problem: Problem, second_order: bool = True) -> Peer:
     Parameters
     ----------
     problem : a `SteeredChain`, or a `Chain` with rolling "unit" and linear curvature; any ends.
-    second_order : slip reflected and half a kick to start, or slip damped out in a step; see the head of this file.
+    second_order : slip reflected and half a kick to start, or slip damped out in a step; see the module's docstring.
 
     Returns
     -------
-    Peer whose settings are numbers of steps, doubling, from just within the stability limit. A run raises Cutoff when over its
-    time and ArithmeticError when it has grown unstable.
+    Peer whose settings are numbers of steps, doubling, from just within the stability limit. A run raises Cutoff if its
+    time is up and ArithmeticError if it becomes unstable.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def mujoco_peer(problem: Problem, second_order: bool = True) -> Peer:
     if isinstance(chain, Chain) and (chain.rolling != "unit" or chain.curvature != "linear"):
         raise ValueError(f"mujoco_peer takes rolling='unit' and linear curvature; got {chain.rolling!r} and {chain.curvature!r}")
     if not np.all(chain.spin_inertia):
-        raise ValueError("mujoco_peer needs spin_inertia above 0: MuJoCo takes no body without")
+        raise ValueError("mujoco_peer needs spin_inertia above 0: MuJoCo accepts no body without it")
     pull, n, rows = _pull(problem), chain.n, ORDER[: len(problem.system.rows)]
 
     def run(setting: float, seconds: float) -> Outcome:
@@ -83,7 +84,7 @@ def mujoco_peer(problem: Problem, second_order: bool = True) -> Peer:
             mujoco.mj_forward(model, data)
             data.qvel[:] -= 0.5 * model.opt.timestep * data.qacc
         warn = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(lambda text: None)  # else of an unstable run, in a file
+        mujoco.set_mju_user_warning(lambda text: None)  # otherwise MuJoCo writes warnings about an unstable run to a file
         try:
             begun = clock.perf_counter()
             for i in range(steps):
@@ -107,7 +108,7 @@ def mujoco_peer(problem: Problem, second_order: bool = True) -> Peer:
 
 
 def _check(data: Any, until: float) -> None:
-    """Stop a run that is over its time, or that MuJoCo found unstable."""
+    """Stop a run whose time is up, or that MuJoCo reports as unstable."""
     if clock.perf_counter() > until:
         raise Cutoff
     if any(warning.number for warning in data.warning):

@@ -14,7 +14,7 @@ from discs.arrays import Float
 def multiplier_peer(problem: Problem) -> Peer:
     """IDA on q. = v, M v. = -grad V + A^T lambda, A(q) v = 0, the multipliers among the unknowns: index 2, banded, plain doubles.
 
-    Written for slaved and own headings alike: A r. = r. - e theta., one row pair for each disc.
+    For slaved and own headings alike: A v = r. - e theta., two rows for each disc.
     """
     from sksundae.ida import IDA
 
@@ -101,8 +101,7 @@ def _residual(problem: Problem) -> Callable[[Float, Float, Float], None]:
 
 
 def saddle_peer(problem: Problem) -> Peer:
-    """The textbook: at every right-hand side the dense saddle point [[M, A^T], [A, 0]] for accelerations and multipliers, in
-    DOP853."""
+    """The textbook method: DOP853, with the dense saddle point [[M, A^T], [A, 0]] solved at every right-hand side."""
     from scipy.integrate import solve_ivp
 
     system = problem.system

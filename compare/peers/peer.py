@@ -1,4 +1,4 @@
-"""What a peer is: settings from loose to tight, and what a run with one of them costs and gives."""
+"""Peers: their settings from loose to tight, and the result and cost of a run."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,11 +7,11 @@ from discs.arrays import Float
 
 
 class Cutoff(Exception):
-    """A run took longer than it was given."""
+    """A run exceeded its time."""
 
 
 class Outcome(NamedTuple):
-    """Where a peer ended: positions (rows, n), its steps, right-hand sides, linear solves or factorisations (None: not told),
+    """Where a peer ended: positions (rows, n), its steps, right-hand sides, linear solves or factorisations (None: unknown),
     seconds, momenta where it has them."""
 
     q: Float
@@ -25,8 +25,8 @@ class Outcome(NamedTuple):
 class Peer(NamedTuple):
     """A peer with its settings, from loose to tight.
 
-    name : as in the table. settings : its tolerances or steps. run : (setting, seconds it is given) -> Outcome. tells : how it
-    differs.
+    name : as in the table. settings : its tolerances or steps. run : (setting, seconds that it may take) -> Outcome.
+    tells : how its problem differs.
     """
 
     name: str

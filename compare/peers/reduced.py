@@ -1,7 +1,7 @@
 """Peers that take a right-hand side, the reduced equations: SciPy and SUNDIALS.
 
 All get the same compiled function, y. = f(t, y) with y = (x, y, theta, pi, ...) disc by disc, bound to its chain so that a call
-costs no more than a call must. Chains without a compiled form (true curvature) get the plain one, as our own methods do.
+has little overhead. Chains without a compiled form (true curvature) get the plain one, as our own methods do.
 """
 
 import time as clock
@@ -17,7 +17,7 @@ from discs.integrators.ivp import Reduced
 
 
 def bound(problem: Problem) -> Callable[[float, Float, Float], None]:
-    """f(t, y, out), compiled for one chain, whose parameters become constants of the code; in NumPy where there is no such form."""
+    """f(t, y, out), compiled for one chain, whose parameters become constants of the code; without a compiled form, in NumPy."""
     if problem.system.kernel is None:
         plain = Reduced(problem.system)
 
@@ -38,18 +38,18 @@ def bound(problem: Problem) -> Callable[[float, Float, Float], None]:
 
 
 def read_only(y: Float) -> Float:
-    """As SUNDIALS hands arrays to callbacks."""
+    """A read-only copy, like the arrays that SUNDIALS passes to callbacks."""
     y = y.copy()
     y.flags.writeable = False
     return y
 
 
 class Bound:
-    """The right-hand side that counts its calls and stops a run that is over its time.
+    """The right-hand side; it counts its calls and stops a run whose time is up.
 
     Parameters
     ----------
-    f : (t, y, out), None to have one compiled for the chain, which takes seconds and saves a third of a call.
+    f : (t, y, out), None compiles one for the chain, which takes seconds and makes calls a third faster.
     """
 
     def __init__(self, problem: Problem, f: Callable[[float, Float, Float], None] | None = None) -> None:
@@ -59,9 +59,9 @@ class Bound:
         self.y0 = self.reduced.join(z.hi, z.pi)
         mass, _, spin = problem.system.weights[:3]
         share = np.sqrt(np.where(spin > 0, spin, mass))
-        # pi of a disc is small like the root of its share of length: so are the errors allowed
+        # pi of a disc scales like the root of its share of the length, and so do the allowed errors
         self.unit = self.reduced.join(np.ones_like(z.hi), np.ones_like(z.pi) * share)
-        for y in (self.y0, read_only(self.y0)):  # compiled for both, before any clock runs
+        for y in (self.y0, read_only(self.y0)):  # compiled for both before anything is timed
             self(0.0, y)
 
     def start(self, seconds: float) -> None:
@@ -76,7 +76,7 @@ class Bound:
         self.f(t, y, out)
 
     def watch(self, t: float) -> None:
-        """Stop a run that is over its time; t is where it is."""
+        """Stop a run whose time is up; t is the time it has reached."""
         if clock.perf_counter() > self.until:
             raise Cutoff
 
@@ -114,7 +114,7 @@ def scipy_peers(problem: Problem, f: Bound) -> list[Peer]:
 
 
 def banded(problem: Problem, width: int) -> dict[str, Any]:
-    """What SUNDIALS is told of the Jacobian: half its bandwidth, but around a ring."""
+    """SUNDIALS' options for the Jacobian: its half-bandwidth, or dense for a ring."""
     return {"linsolver": "dense"} if problem.system.closed else {"linsolver": "band", "lband": width, "uband": width}
 
 

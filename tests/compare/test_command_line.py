@@ -54,7 +54,7 @@ def test_closed_scene(tmp_path, monkeypatch, capsys):
         (["--n", "33", "17"], "increasing whole numbers"),
         (["--tol", "-1"], "tol must be a positive"),
         (["--scene", "missing.toml"], "cannot be read"),
-        (["--scene", "a.toml", "--rolling", "unit"], "--rolling belongs to the default scene"),
+        (["--scene", "a.toml", "--rolling", "unit"], "--rolling is for the default scene"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(arguments, message, tmp_path, capsys):
@@ -95,7 +95,7 @@ def test_unwritable_out(tmp_path, capsys):
     assert "--out must be a folder that can be written to" in capsys.readouterr().err
     assert main(["--out", str(tmp_path / "file"), "--quiet"]) == 2
     (tmp_path / "energy.png").mkdir()
-    with pytest.raises(ValueError, match="--out holds a folder where a file is to be written"), fresh_files(tmp_path) as folder:
+    with pytest.raises(ValueError, match="--out contains a folder in place of the file"), fresh_files(tmp_path) as folder:
         (folder / "energy.png").write_text("")
 
 

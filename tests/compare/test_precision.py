@@ -157,7 +157,7 @@ def test_an_interrupted_run_leaves_what_it_has_finished(tmp_path, capsys, monkey
     assert main([*arguments, "--n", "10", "9", "--out", str(out)]) == 130
     assert not out.exists()
     assert main([*arguments, "--n", "9", "10", "--out", str(out)]) == 130
-    assert "that is what was finished" in capsys.readouterr().err
+    assert "these are the results so far" in capsys.readouterr().err
     sizes = [line.split(",")[1] for line in (out / "precision-partial.csv").read_text().splitlines()]
     assert set(sizes) == {"n", "9"}
     assert sorted(p.name for p in out.iterdir()) == [f"precision-partial.{end}" for end in ("csv", "md", "png")]

@@ -126,14 +126,14 @@ def test_slow_runs_of_ours_are_not_begun(name, method, limit):
     (case,) = (c for c in SMALL if c.name == name)
     found = case.run(method, limit)
     assert found.outcome == "cut off"
-    assert "foretold" in found.says
+    assert "predicted" in found.says
     assert found.seconds > 0.01
 
 
 def test_verdicts():
     exact = Expectation("exact", "", energy=1e-10, error=0.1, must=("midpoint",))
     good, off = Found("done", energy=1e-12, error=0.01), Found("done", energy=0.5)
-    assert exact.verdict("midpoint", good) == "holds"
+    assert exact.verdict("midpoint", good) == "passed"
     assert exact.met("midpoint", good) is True
     assert exact.met("midpoint", Found("done", energy=1e-9)) is False
     assert exact.met("rk4", Found("done", energy=1e-9)) is True
@@ -216,7 +216,7 @@ def test_command_line_keeps_what_an_interrupt_leaves_and_goes_on(tmp_path, capsy
     """An interrupt stops the processes of a sweep, see test_sweeps: here it comes during the 20th run."""
     command = ["stability", "--quick", "--quiet", "--seconds", "0.5", "--out", str(tmp_path)]
     assert main(command) == 130
-    assert "holds what was found; the same command goes on" in capsys.readouterr().err
+    assert "has the results so far; the same command continues" in capsys.readouterr().err
     before = [result.case for result in read(tmp_path / "stability.jsonl")]
     assert 5 <= len(rows(tmp_path)) == len(before) <= 19
     few.clear()

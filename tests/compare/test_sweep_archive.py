@@ -26,12 +26,10 @@ def test_functions_that_differ_share_no_archive(tmp_path):
         assert read(file)[0].value == 4
         k = 5
         for other in (lambda n: n + k, lambda n: n - 3, lambda n: n + 3):
-            with pytest.raises(
-                ValueError, match=r"holds results of .*lambda>, which has changed since, or Python has; take another"
-            ):
+            with pytest.raises(ValueError, match=r"has results of .*lambda>, which has changed since, or Python has; take another"):
                 sweep(other, [1], executor, file, progress=False)
         stream = open(file)  # noqa: SIM115
-        with pytest.raises(ValueError, match="an archive must know its function, and cannot know"):
+        with pytest.raises(ValueError, match="an archive must identify its function, and cannot identify"):
             sweep(lambda n: stream.read(n), [1], executor, file, progress=False)
         stream.close()
     assert file.read_bytes() == before

@@ -70,7 +70,7 @@ def test_failures_are_reported_and_tried_again(tmp_path, noted):
         assert [r.value for r in found] == [1, None, None, 2]
         assert found[1].error == "ValueError: three is refused"
         assert "in noting" in found[1].trace
-        assert found[2].error == "TypeError: object is not something JSON can hold"
+        assert found[2].error == "TypeError: object cannot be stored as JSON"
         assert noted("better") == [1, 3, 4, 2]
         again = sweep(noting, [1, 3, 4, 2], executor, file, progress=False)
     assert noted() == [3, 4]
@@ -228,12 +228,12 @@ def test_an_interrupt_stops_the_processes_at_once(tmp_path):
 def test_bad_input(tmp_path):
     with pytest.raises(ValueError, match="cases of a sweep must differ; got 2 twice"):
         sweep(picky, [1, 2, 2])
-    with pytest.raises(ValueError, match="case of a sweep must be what JSON can hold"):
+    with pytest.raises(ValueError, match="case of a sweep must be what JSON can store"):
         sweep(picky, [{1, 2}])
     file = tmp_path / "sweep.jsonl"
     with ThreadPoolExecutor(1) as executor:
         sweep(picky, [1], executor, file, progress=False)
-    with pytest.raises(ValueError, match=r"holds results of .*picky, not of .*end_disc"):
+    with pytest.raises(ValueError, match=r"has results of .*picky, not of .*end_disc"):
         sweep(end_disc, CASES, archive=file)
     file.write_text("n,x\n3,4\n")
     with pytest.raises(ValueError, match="must be a file that a sweep has written"):

@@ -150,6 +150,6 @@ def test_an_interrupted_run_keeps_what_it_has_found(tmp_path, capsys, monkeypatc
 
     monkeypatch.setattr("compare.__main__.trust", interrupted)
     assert main(["trust", "--quiet", "--out", str(out)]) == 130
-    assert "the same command goes on" in capsys.readouterr().err
+    assert "the same command continues" in capsys.readouterr().err
     assert (out / "trust.csv").read_text().count("0:7") == 2
     assert (out / "trust.jsonl").exists()
