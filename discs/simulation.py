@@ -15,7 +15,7 @@ from discs.integrators.base import Cut
 from discs.problem import Problem
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.recording import Recording, Rows, kept_settings
-from discs.running.stats import Stats
+from discs.running.stats import Stats, of_search
 from discs.running.step_error import WARNED, Watch, cure, doubts
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
@@ -131,8 +131,7 @@ def _search(
         found, doubt = error.best, f"{error.message}: this is the last run"
     if checkpoint is not None:
         integrator, dt = from_settings(found.stats["settings"]), found.stats["dt"]
-        searched = {"tol": found.stats["tol"], "attempts": found.stats["attempts"]}
-        known = found.error_estimate
+        searched, known = of_search(found.stats), found.error_estimate
         found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched, known)
     return found, doubt
 

@@ -125,6 +125,15 @@ class Integrator(ABC):
         """
         return None
 
+    @property
+    def sweep_tolerance(self) -> float:
+        """What its sweeps converge to; 0 where it has no sweeps, or a fixed number of them."""
+        return 0.0
+
+    def with_sweeps(self, tolerance: float) -> "Integrator":
+        """The same method with its sweeps converged to a tolerance; itself where it has no sweeps, or a fixed number of them."""
+        return self
+
     def extras(self, system: RollingDiscs, memory: Any, h: float) -> dict[str, float]:
         """The quantities in `offers`, at the last step."""
         return {}

@@ -1,7 +1,7 @@
 """Symmetric compositions of midpoint steps: higher order, the same exact energy."""
 
 from abc import ABC
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -36,6 +36,13 @@ class Composition(OneStep, ABC):
     def __post_init__(self) -> None:
         if not isinstance(self.base, Midpoint):
             raise ValueError(f"base must be a Midpoint; got {checks.shown(self.base)}")
+
+    @property
+    def sweep_tolerance(self) -> float:
+        return self.base.tolerance
+
+    def with_sweeps(self, tolerance: float) -> "Composition":
+        return replace(self, base=self.base.with_sweeps(tolerance))
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         for fraction in self.fractions:

@@ -1,7 +1,7 @@
 """Collocation at Gauss points."""
 
 from abc import ABC
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -44,6 +44,13 @@ class Gauss(OneStep, ABC):
 
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
+
+    @property
+    def sweep_tolerance(self) -> float:
+        return self.tolerance
+
+    def with_sweeps(self, tolerance: float) -> "Gauss":
+        return replace(self, tolerance=tolerance) if self.tolerance else self
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         a, b, nodes, last, real, real_in, real_out, pairs, pairs_in, pairs_out = tableau(self.stages)

@@ -1,6 +1,6 @@
 """Implicit midpoint in (q, pi), solved by sweeps with frozen geometry."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -60,6 +60,13 @@ class Midpoint(OneStep):
 
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
+
+    @property
+    def sweep_tolerance(self) -> float:
+        return self.tolerance
+
+    def with_sweeps(self, tolerance: float) -> "Midpoint":
+        return replace(self, tolerance=tolerance) if self.tolerance else self
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)

@@ -11,7 +11,7 @@ import threading
 import time as clock
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from discs.files.framefile import FrameFile, room
 from discs.files.restart import FROM_THE_BEGINNING, Restart
 from discs.integrators import Integrator, from_settings
 from discs.problem import Problem
-from discs.running.stats import Stats
+from discs.running.stats import Stats, of_search
 from discs.running.time_loop import March
 from discs.solution import Solution
 from discs.warn import warn
@@ -271,7 +271,7 @@ def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> 
         told = f": {stats.get('tol')} there, {tol} here"
         raise ValueError(f"{path} holds another run, whose tol differs{told}; give another path, or delete it")
     try:
-        searched = cast(Stats, {name: stats[name] for name in ("tol", "attempts") if name in stats})
+        searched = of_search(stats)
         return from_settings(str(stats["settings"])), checks.number("dt", stats["dt"], positive=True), searched
     except (KeyError, ValueError) as error:
         raise ValueError(f"{path} holds no run that can go on: {error}; give another path, or delete it") from None

@@ -1,6 +1,6 @@
 """What a run tells of itself."""
 
-from typing import Any, TypedDict
+from typing import Any, TypedDict, cast
 
 
 class Stats(TypedDict, total=False):
@@ -19,6 +19,7 @@ class Stats(TypedDict, total=False):
     dt_suggested: bool  # whether nobody gave it
     tol: float | dict[str, float]  # the tolerance asked for
     attempts: int  # runs that were made to reach it
+    limited_by: str  # what made the run as accurate as it is: "tolerance", "fewest steps" or "sweeps", see `running.tolerance`
 
     # what it took
     steps: int
@@ -41,3 +42,8 @@ class Stats(TypedDict, total=False):
     elements: int
     nodes: int
     radius: float
+
+
+def of_search(stats: Stats) -> Stats:
+    """What the stats of a run tell of the search for its step."""
+    return cast(Stats, {name: value for name, value in stats.items() if name in ("tol", "attempts", "limited_by")})

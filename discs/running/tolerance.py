@@ -1,17 +1,37 @@
-"""A run to a tolerance: which method, which step, by comparing runs with steps that shrink."""
+"""A run to a tolerance: which method, which step.
+
+Given a problem, tolerances and frames, find a run and the errors of what it records.
+
+1. Run with FEWEST steps, and with twice as many and one (steps that alternate are not to agree by chance).
+2. The run with shorter steps measures the error of the one before. Errors C (h r)^p and C h^p differ by C (h r)^p (1 - r^-p): the
+   longer steps err by d/(1 - r^-p), d the largest difference over discs and frames. SAFETY times that, and what sweeps may leave,
+   is the estimate. It hardly depends on p. So the run with the *longer* steps is the result: its error is known. That of the
+   shorter ones, d/(r^p - 1), is known only as well as p, which changes by up to 4 from run to run while waves are not yet resolved.
+3. Three runs show p: the last measures the errors of both before. After two runs p = 1. Estimates count on MOST_ORDER at most.
+4. If the estimate is within every tolerance, that is the result. If not, go to 2 with more steps, by a factor within GROWTH: so
+   many that C h^p reaches the tolerance over AIM.
+5. The error has stalled if p is at most LEAST_ORDER. "auto" takes a method of higher order after two stalls in a row. Where there
+   is none, a stall asks for the cause: a run whose positions start one unit in the last place away. If it differs by a tenth of the
+   error or more, rounding is the limit, and `NotReached` is raised. For tolerances below FINE such a run is made as soon as errors
+   are below RESOLVED; if it differs by more than the tolerance, no step can help.
+6. A run that fails, or whose sweeps do not converge, is followed by one of twice as many steps. The motion itself ends where a disc
+   loses its heading: told by its |r'| a step before, and by runs of two steps that lose it at one time.
+
+Sweeps converge to a tolerance that leaves SWEPT of what is asked for after all steps (`discs.running.estimates.sweeps_to`). The
+constants in capitals were found by experiment, on random problems of other seeds than those of docs/trust.md.
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discs import checks
-from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find
-from discs.integrators.composition import Composition
-from discs.integrators.gauss import Gauss
-from discs.problem import Problem, State
+from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find, from_settings
+from discs.problem import Problem
+from discs.running import estimates
+from discs.running.estimates import LEAST_ORDER
 from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import SimulationError
@@ -22,20 +42,15 @@ LEAST = 1e-12  # the least tolerance: some thousand times the rounding of a posi
 LOOSE = 3e-4  # from here on "auto" begins with the midpoint method
 FEWEST = 20  # steps to begin with
 PROBES = 101  # frames that runs are compared at during the search, at most
-ORDERS = (2.0, 1.75, 1.5, 1.25, 1.0, 0.75, 0.5)  # of errors, as they are seen
-SAFETY = 2.0  # steps are not yet small when errors are large: found by experiment
-SURE = 1.5  # no error is estimated below so many times the change
-STALL = 0.5  # order seen from run to run: at it or below the error has stalled
 GROWTH = 1.5, 3.0  # of the number of steps from run to run
+AIM = 1.3  # times fewer errors than the order foretells are aimed at
+RESOLVED = 1e-2  # relative error: from here on a motion tells what rounding does to it
+FINE = 1e-6  # tolerances below are held against rounding first
 ENDED = 0.01  # |r'| of a disc a step before it loses its heading; where it is larger, the step is too long
-ATTEMPTS, FAILURES = 20, 12  # runs, and those of them that may stop early
-SHARED = 100  # steps that may each leave what the sweeps' tolerance says
-SWEPT = 10.0  # what sweeps leave, in units of their tolerance
-ROUNDED = 1e-12  # largest value of what is rounding only, in units of its scale
+ATTEMPTS, FAILURES = 24, 12  # runs, and those of them that may stop early
 
-RATES = ("omega", "phi_rate", "x_rate", "y_rate")
-DERIVED = (*RATES, "slope_x", "slope_y", "contact_force", "modified_energy")
 WANTED = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y"), "contact_force": ("contact_force",)}
+LADDER = Midpoint(), Gauss6(), Gauss8()  # what "auto" takes, one after the other
 
 Run = Callable[[Problem, Integrator, float, NDArray], Solution]
 
@@ -47,38 +62,14 @@ def names(problem: Problem, want: Iterable[str] = ()) -> tuple[str, ...]:
     return (*rows, "omega", *turning, *(name for key in want for name in WANTED.get(key, ())))
 
 
-def method_for(method: str | Integrator, tol: float, stalled: int = 0) -> Integrator:
-    """The integrator for a tolerance, its sweeps converged well below it; "auto" chooses, and goes on where one has `stalled`."""
+def methods_for(method: str | Integrator, tol: float) -> tuple[Integrator, ...]:
+    """The integrators for a tolerance: the first, and those that follow where one stalls."""
     if method == "auto":
-        if tol >= LOOSE and not stalled:
-            return Midpoint(tolerance=min(1e-2 * tol, 1e-4))
-        return (Gauss8 if stalled + (tol < LOOSE) > 1 else Gauss6)(tolerance=_swept(min(tol, LOOSE)))
+        return LADDER if tol >= LOOSE else LADDER[1:]
     integrator = find(method)
-    if isinstance(method, str) and isinstance(integrator, Midpoint | Gauss):
-        return replace(integrator, tolerance=_swept(tol))
-    if isinstance(method, str) and isinstance(integrator, Composition):
-        return replace(integrator, base=Midpoint(tolerance=_swept(tol)))
     if integrator.adaptive:
         raise ValueError(f"{integrator.name} has tolerances of its own: {type(integrator).__name__}(rtol=..., atol=...)")
-    return integrator
-
-
-def _swept(tol: float) -> float:
-    return max(1e-3 * tol, 1e-13)
-
-
-def sharpened(integrator: Integrator, steps: int) -> Any:
-    """The integrator with its sweeps' tolerance shared out among steps beyond SHARED: what sweeps leave adds up."""
-    if isinstance(integrator, Composition):
-        return replace(integrator, base=sharpened(integrator.base, steps))
-    if isinstance(integrator, Midpoint | Gauss) and integrator.tolerance > 0:
-        return replace(integrator, tolerance=min(integrator.tolerance, max(integrator.tolerance * SHARED / steps, 1e-13)))
-    return integrator
-
-
-def tolerance_of(integrator: Integrator) -> float:
-    """The tolerance of its sweeps, 0 for an explicit one."""
-    return float(getattr(getattr(integrator, "base", integrator), "tolerance", 0.0))
+    return (integrator,)
 
 
 def to_tolerance(
@@ -89,16 +80,7 @@ def to_tolerance(
     run: Run,
     want: Iterable[str] = (),
 ) -> Solution:
-    """Run with smaller and smaller steps until the last change says that the tolerance is kept.
-
-    Errors of two runs, steps h and h/r, are taken to be as 1 to r^-p: the error of the finer is then the change over r^p - 1; twice
-    that, and no less than 1.5 times the change, is the estimate. The order p is what the last three runs show, at most 2 (stiff
-    modes reduce that of higher methods), and little where waves that no step resolves yet are in what changes; it is 1 after two
-    runs. What sweeps leave, some times their tolerance, is added. The energy is known: its error is what it changed by.
-
-    A motion ends where a disc loses its heading: told by its |r'| a step before, and by runs of two steps that lose it at one time.
-    "auto" goes on with a method of higher order where the change stalls, twice in a row. The search fails where the change of two
-    runs is that of two runs that start one unit in the last place apart: then it is rounding, amplified by the motion.
+    """Run with shorter and shorter steps until a run is known to be within the tolerance; the algorithm is that of the module.
 
     Parameters
     ----------
@@ -110,7 +92,9 @@ def to_tolerance(
 
     Returns
     -------
-    Solution of the last run, with `error_estimate` of every quantity recorded, over all frames; stats["attempts"] counts the runs.
+    Solution with `error_estimate` of every quantity recorded, over all frames. stats["attempts"] counts the runs, and
+    stats["limited_by"] says what made it as accurate as it is: "tolerance"; "fewest steps", where its method went with no longer
+    steps, or "sweeps", most of the estimate: then the error may be far below the tolerance, or the estimate.
 
     Raises
     ------
@@ -118,23 +102,22 @@ def to_tolerance(
     NotReached : if the tolerance is not reached.
     SimulationError : if the motion ends before, or runs fail at every step.
     """
-    rows = problem.system.rows
-    bound = checks.tolerances(tol, names(problem, want), rows, LEAST)
-    sharpest = min(value if name in rows else 1e-2 * value for name, value in bound.items())  # sweeps are told by moves, not rates
-    integrator = method_for(method, sharpest)
+    bound = checks.tolerances(tol, names(problem, want), problem.system.rows, LEAST)
+    integrator, *higher = methods_for(method, min(bound.values()))
     if not times[-1]:
         start = run(problem, integrator, problem.duration / FEWEST, times)
-        return _told(start, dict.fromkeys(_compared(start), 0.0), tol, 1)
-    some = some_of(times)
-    steps, level, stalls, failures, worst = _fewest(problem, integrator, times[-1]), 0, 0, 0, np.inf
-    last: Solution | None = None
-    change: Change | None = None
+        return _told(start, dict.fromkeys(estimates.compared(start), 0.0), tol, 1, "fewest steps")
+    end, some = float(times[-1]), some_of(times)
+    steps = _fewest(problem, integrator, end)
+    runs: list[Solution] = []  # of one method, each with shorter steps than the one before, three at most
+    size: dict[str, float] = {}
     failure: SimulationError | None = None
+    looked, stalls, failures = False, 0, 0
     for attempt in range(1, ATTEMPTS + 1):
-        dt, sharp = times[-1] / steps, sharpened(integrator, steps)
+        dt = end / steps
+        sharp = _sharpened(integrator, isinstance(method, str), estimates.sweeps_to(problem, bound, size, dt, end))
         try:
-            found = run(problem, sharp, dt, some)
-            failure = None
+            found, failure = run(problem, sharp, dt, some), None
         except SimulationError as error:
             if failure and error.slope < ENDED and abs(error.time - failure.time) < 3 * dt:  # the last dt was twice that
                 raise
@@ -142,34 +125,45 @@ def to_tolerance(
             if failures == FAILURES:
                 raise
         if failure or found.stats["unconverged"]:
-            steps, last, change = 2 * steps, None, None
+            steps, runs = 2 * steps, []
             continue
-        if last is not None:
-            earlier, change = change, Change(last, found)
-            errors = estimates(found, change, earlier, tolerance_of(sharp))
-            worst = _worst(found, errors, bound)
-            if worst <= 1 and some.size < times.size:
-                last, found = (run(problem, sharp, h, times) for h in (last.stats["dt"], dt))
-                errors = estimates(found, Change(last, found), earlier, tolerance_of(sharp))
-                worst = _worst(found, errors, bound)
-            if worst <= 1:
-                return _told(found, errors, tol, attempt)
-            stalled = earlier is not None and min(change.order(name, earlier) for name in bound) <= STALL
-            stalls = stalls + 1 if stalled else 0
-            if stalls >= 2:
-                if method == "auto" and method_for(method, sharpest, level + 1) != integrator:
-                    level, stalls, worst, last, change = level + 1, 0, np.inf, None, None
-                    integrator, steps = method_for(method, sharpest, level), max(FEWEST, steps // 4)
-                    continue
-                floor = _worst(found, _differences(found, run(_nudged(problem), sharp, dt, found.t)), bound)
-                if floor > worst / 10:
-                    raise NotReached(_tight(bound), worst, dt, floor, _told(found, errors, tol, attempt))
-        last = found
-        growth = 2.0 if not np.isfinite(worst) else float(np.clip(1.1 * worst**0.4, *GROWTH))
-        steps = int(np.ceil(growth * steps))
-    if last is None or change is None:
+        runs, size = [*runs[-2:], found], estimates.sizes(found, bound)
+        if len(runs) == 1:
+            steps = 2 * steps + 1
+            continue
+        first = len(runs) == 2
+        order = {} if first else estimates.orders(runs[0], runs[1], found, integrator.order)
+        longer = runs[-2]
+        errors = estimates.errors(longer, found, order)
+        worst = _worst(errors, bound, size)
+        if worst <= 1 and some.size < times.size:
+            pair = (from_settings(longer.stats["settings"]), longer.stats["dt"]), (sharp, dt)
+            longer, shorter = (run(problem, settings, h, times) for settings, h in pair)
+            errors = estimates.errors(longer, shorter, order)
+            worst = _worst(errors, bound, estimates.sizes(shorter, bound))
+        swept = dict.fromkeys(bound, 0.0) | estimates.unswept(longer)
+        limit = "fewest steps" if first else "sweeps" if _worst(swept, bound, size) > worst / 2 else "tolerance"
+        best = _told(longer, errors, tol, attempt, limit)
+        if worst <= 1:
+            return best
+        seen = 1.0 if first else order[max(bound, key=lambda name: errors[name] / bound[name] / size[name])]
+        stalls = stalls + 1 if not first and seen <= LEAST_ORDER else 0
+        resolved = min(bound.values()) < FINE and not looked and max(errors[name] / size[name] for name in bound) < RESOLVED
+        if resolved or (stalls and not higher):
+            looked = True
+            floor = _worst(estimates.differences(found, run(estimates.nudged(problem), sharp, dt, found.t)), bound, size)
+            if floor > (1 if resolved else worst / 10):
+                raise NotReached(min(bound.values()), worst, best.stats["dt"], floor, best)
+        if stalls >= 2 and higher:
+            integrator, *higher = higher
+            steps, runs, stalls = max(FEWEST, steps // 4), [], 0
+            continue
+        least, most = GROWTH
+        wanted = longer.stats["steps"] * (AIM * worst) ** (1 / (integrator.order if first else max(seen, 1.0)))
+        steps = int(np.ceil(np.clip(wanted, least * steps, most * steps)))
+    if len(runs) < 2:
         raise failure or SimulationError(f"steps do not converge, down to dt = {dt:g}; take another method", 0, 0.0, 0)
-    raise NotReached(_tight(bound), worst, dt, None, _told(found, errors, tol, ATTEMPTS))
+    raise NotReached(min(bound.values()), worst, best.stats["dt"], None, best)
 
 
 def some_of(times: NDArray) -> NDArray:
@@ -182,7 +176,7 @@ class NotReached(SimulationError):
 
     Attributes
     ----------
-    best : the last run, with its estimate.
+    best : the last run whose error is known, with its estimate.
     """
 
     def __init__(self, tol: float, worst: float, dt: float, floor: float | None, best: Solution) -> None:
@@ -199,69 +193,20 @@ class NotReached(SimulationError):
         return type(self), self._given
 
 
-class Change:
-    """What changed from a run to one with shorter steps: `ratio` of the steps, largest differences `of` each quantity."""
-
-    def __init__(self, last: Solution, found: Solution) -> None:
-        self.ratio, self.of = last.stats["dt"] / found.stats["dt"], _differences(found, last)
-
-    def order(self, name: str, earlier: "Change | None") -> float:
-        """The order of a quantity's error, from this change and an earlier one, of the steps before: of ORDERS; 1 if not known.
-
-        Errors C h^p change by C h^p (r^p - 1) from steps h r to h, so changes are as r^p (s^p - 1) to r^p - 1, s the ratio before.
-        """
-        if earlier is None:
-            return 1.0
-        r, s, now, then = self.ratio, earlier.ratio, self.of[name], earlier.of[name]
-        return next((p for p in ORDERS if then * (r**p - 1) >= now * r**p * (s**p - 1)), ORDERS[-1])
+def _sharpened(integrator: Integrator, free: bool, tolerance: float) -> Integrator:
+    """The integrator with its sweeps converged to a tolerance, or to a smaller one of its own unless that is `free`."""
+    return integrator.with_sweeps(tolerance if free else min(tolerance, integrator.sweep_tolerance))
 
 
-def estimates(found: Solution, change: Change, earlier: Change | None, swept: float) -> dict[str, float]:
-    """Errors of a run, largest over discs and frames; see `to_tolerance`. swept : the sweeps' tolerance."""
-    assert found.problem is not None
-    system, dt = found.problem.system, found.stats["dt"]
-    length = float(system.scale[0])
-    left = dict(zip(system.rows, system.scale.tolist(), strict=True))
-    left |= {"omega": 1 / dt, "phi_rate": 1 / dt, "x_rate": length / dt, "y_rate": length / dt}
-    errors = {
-        name: value * max(SURE, SAFETY / (change.ratio ** change.order(name, earlier) - 1)) + SWEPT * swept * left.get(name, 0.0)
-        for name, value in change.of.items()
-    }
-    return errors | {"energy": float(np.abs(found.energy - found.problem.energy()).max())}
-
-
-def _compared(found: Solution) -> list[str]:
-    """Names of what a run records of its motion."""
-    assert found.problem is not None
-    recorded = (*found.problem.system.rows, *DERIVED, "energy")
-    return [name for name in recorded if getattr(found, name) is not None]
-
-
-def _differences(one: Solution, other: Solution) -> dict[str, float]:
-    return {name: float(np.abs(getattr(one, name) - getattr(other, name)).max()) for name in _compared(one)}
-
-
-def _worst(found: Solution, errors: dict[str, float], bound: dict[str, float]) -> float:
+def _worst(errors: Mapping[str, float], bound: Mapping[str, float], size: Mapping[str, float]) -> float:
     """The largest error in units of its tolerance."""
-    assert found.problem is not None
-    system = found.problem.system
-    scale = dict(zip(system.rows, system.scale, strict=True))
-
-    def size(name: str) -> float:
-        largest = float(np.abs(getattr(found, name)).max())
-        return largest if largest > ROUNDED * scale.get(name, 0.0) else scale.get(name, 1.0)
-
-    return max(errors[name] / (tol * size(name)) for name, tol in bound.items())
+    return max(errors[name] / (tol * size[name]) for name, tol in bound.items())
 
 
-def _told(found: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int) -> Solution:
+def _told(run: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int, limit: str) -> Solution:
     """The run with what was found out about it."""
-    told: Stats = {"tol": dict(tol) if isinstance(tol, Mapping) else tol, "attempts": attempts}
-    return replace(found, error_estimate=errors, stats=found.stats | told)
-
-
-def _tight(bound: dict[str, float]) -> float:
-    return min(bound.values())
+    told: Stats = {"tol": dict(tol) if isinstance(tol, Mapping) else tol, "attempts": attempts, "limited_by": limit}
+    return replace(run, error_estimate=errors, stats=run.stats | told)
 
 
 def _fewest(problem: Problem, integrator: Integrator, end: float) -> int:
@@ -269,15 +214,3 @@ def _fewest(problem: Problem, integrator: Integrator, end: float) -> int:
     if not np.isfinite(integrator.stability_limit):
         return FEWEST
     return max(FEWEST, int(np.ceil(end / suggest_dt(problem, integrator))))
-
-
-def _nudged(problem: Problem) -> Problem:
-    """The problem from positions and angles one unit in the last place away, to either side."""
-    start, rng = problem.initial, np.random.default_rng(0)
-
-    def nudge(value: NDArray) -> NDArray:
-        return np.nextafter(value, value + rng.choice((-1.0, 1.0), value.shape))
-
-    moved = {name: nudge(np.array(getattr(start, name))) for name in problem.system.rows}
-    rates = {"omega": start.omega, "phi_rate": start.phi_rate}
-    return replace(problem, initial=State(**moved, **rates))

@@ -10,9 +10,9 @@ import pytest
 from compare import lump
 from compare.hardcases.problems import rough
 from continuum import breathing_ring, rolling_rod, steered_rod, untwisting_rod
-from discs import Gauss6, Gauss8, SimulationError, checks, simulate
+from discs import Gauss6, Gauss8, SimulationError, State, checks, load, simulate
 from discs.integrators import DOP853
-from discs.running.tolerance import ATTEMPTS, to_tolerance
+from discs.running.tolerance import ATTEMPTS, NotReached, to_tolerance
 from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
 
@@ -135,7 +135,7 @@ def test_without_any_setting_a_run_is_to_a_thousandth():
 
 def test_where_a_thousandth_is_out_of_reach_that_is_a_warning(monkeypatch):
     monkeypatch.setattr("discs.running.tolerance.ATTEMPTS", 4)
-    problem = lump(untwisting_rod(twist=2.0), 33, "consistent")
+    problem = lump(untwisting_rod(twist=3.0), 33, "consistent")
     with pytest.warns(UserWarning, match=r"tol = 0.001 was not reached: the error is estimated at .*: this is the last run"):
         run = simulate(problem, progress=False)
     assert run.error_estimate["theta"] > 1e-3
@@ -179,6 +179,44 @@ def test_runs_with_steps_that_did_not_converge_are_never_taken():
     assert seen[0].stats["unconverged"] > 0
     assert found.stats["unconverged"] == 0
     assert not any(made.stats["unconverged"] for made in seen[-2:])
+
+
+def test_an_estimate_is_a_few_times_the_error():
+    """Two methods, from smooth motions to stiff ones: the run is the one whose error the last run measured."""
+    smooth, stiff = lump(breathing_ring(duration=2.0), 40), lump(steered_rod(10.0, 10.0, 0.05), 33)
+    for problem, tol in [(smooth, 1e-8), (stiff, 1e-3), (stiff, 1e-6), (lump(untwisting_rod(), 65), 1e-5)]:
+        run = simulate(problem, "auto", tol=tol, frames=6, progress=False)
+        exact = simulate(problem, Gauss8(tolerance=1e-14), run.stats["dt"] / 8, run.t, progress=False)
+        parts = [(run.error_estimate[row], getattr(run, row), getattr(exact, row)) for row in problem.system.rows]
+        error = max(np.abs(a - b).max() / np.abs(b).max() for _, a, b in parts)
+        assert error <= max(estimate / np.abs(b).max() for estimate, _, b in parts) <= 5 * error
+
+
+def test_what_limits_a_run_is_said_and_kept(tmp_path):
+    problem = lump(untwisting_rod(duration=0.5), 5)
+    for more in ({}, {"checkpoint": tmp_path / "run.nc"}, {"checkpoint": tmp_path / "run.nc"}):
+        run = simulate(problem, "auto", tol=1e-2, frames=6, progress=False, **more)
+        assert (run.stats["limited_by"], run.stats["steps"]) == ("fewest steps", 20)
+    assert load(tmp_path / "run.nc").stats["limited_by"] == "fewest steps"
+
+
+def test_coordinates_that_hardly_move_are_resolved():
+    """Discs that miss the bump: y moves by a millionth, and its sweeps converge to a part of that."""
+    s = np.linspace(0.0, 4.0, 5)
+    start = State(s, 0 * s, 1e-6 * np.cos(np.pi * s / 4), 1e-6 * s)
+    problem = replace(lump(untwisting_rod(duration=2.0), 5), initial=start)
+    run = simulate(problem, tol=1e-7, frames=6, progress=False)
+    assert np.abs(run.y).max() < 1e-5
+    assert true_error(problem, run) <= 1e-7
+
+
+def test_tolerances_below_rounding_are_refused_after_a_look(monkeypatch):
+    """One unit in the last place makes more than 1e-12 of y: nothing finer than the runs that resolve the motion is tried."""
+    problem = lump(rolling_rod(omega=3.0, amplitude=0.01, duration=3.0), 33)
+    with pytest.raises(NotReached, match="rounding is what is left") as caught:
+        simulate(problem, tol=1e-12, frames=3, progress=False)
+    assert caught.value.best.error_estimate["y"] > 1e-8
+    assert caught.value.best.stats["steps"] < 500
 
 
 def problem_of(seed):

@@ -1,0 +1,116 @@
+"""Errors of runs with different steps: how far they are apart, the order that this shows, and what unfinished sweeps add."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.integrators import from_settings
+from discs.problem import Problem, State
+from discs.skew import SkewGradient
+from discs.solution import Solution
+
+LEAST_ORDER = 0.5  # at it or below an error has stalled; no order is taken to be less
+MOST_ORDER = 2.0  # that an estimate relies on; higher ones change from run to run
+SAFETY = 1.5  # of estimates
+ROUNDED = 1e-12  # largest value of what is rounding only, in units of its scale
+SWEPT = 0.004  # of a tolerance: what sweeps may leave of it
+LEFT = 0.5  # what a step's sweeps leave, in units of their tolerance: 0.4 at most was seen, on rings, mostly a tenth of that
+LEFT_RATE = 10.0  # the same of a rate, in units of their tolerance over the step
+LEAST_SWEPT = 1e-16  # tolerance of sweeps: rounding
+
+RATES = ("omega", "phi_rate", "x_rate", "y_rate")
+DERIVED = (*RATES, "slope_x", "slope_y", "contact_force", "modified_energy")
+
+
+def differences(one: Solution, other: Solution) -> dict[str, float]:
+    """The largest difference of two runs over discs and frames, of every quantity that both record."""
+    return {name: float(np.abs(getattr(one, name) - getattr(other, name)).max()) for name in compared(one)}
+
+
+def compared(run: Solution) -> list[str]:
+    """Names of what a run records of its motion."""
+    assert run.problem is not None
+    recorded = (*run.problem.system.rows, *DERIVED, "energy")
+    return [name for name in recorded if getattr(run, name) is not None]
+
+
+def sizes(run: Solution, names: Iterable[str]) -> dict[str, float]:
+    """The largest value of each quantity; its scale (length, a radian), or 1, where that is rounding only."""
+    assert run.problem is not None
+    scale = _scales(run.problem.system)
+
+    def size(name: str) -> float:
+        largest = float(np.abs(getattr(run, name)).max())
+        return largest if largest > ROUNDED * scale.get(name, 0.0) else scale.get(name, 1.0)
+
+    return {name: size(name) for name in names}
+
+
+def orders(earlier: Solution, run: Solution, finer: Solution, most: int) -> dict[str, float]:
+    """The order of each quantity's error: p of h^p from two runs, their errors measured by one with shorter steps."""
+    shorter = math.log(earlier.stats["dt"] / run.stats["dt"])
+    before, after = differences(earlier, finer), differences(run, finer)
+    found = {}
+    for name, off in after.items():
+        order = math.log(before[name] / off) / shorter if off and before[name] else most if before[name] or not off else 0.0
+        found[name] = min(max(order, LEAST_ORDER), float(most))
+    return found
+
+
+def errors(run: Solution, finer: Solution, order: Mapping[str, float]) -> dict[str, float]:
+    """Estimates of a run's errors, largest over discs and frames, from one with shorter steps; see `discs.running.tolerance`.
+
+    order : as it was seen, 1 where it is missing. What sweeps leave is added. The energy's error is known: what it changed by.
+    """
+    assert run.problem is not None
+    ratio, more = run.stats["dt"] / finer.stats["dt"], unswept(run)
+    found = {}
+    for name, off in differences(run, finer).items():
+        part = 1 - ratio ** -min(order.get(name, 1.0), MOST_ORDER)
+        found[name] = SAFETY * off / part + more.get(name, 0.0)
+    return found | {"energy": float(np.abs(run.energy - run.problem.energy()).max())}
+
+
+def unswept(run: Solution) -> dict[str, float]:
+    """What the sweeps of a run may leave of positions, angles and their rates."""
+    assert run.problem is not None
+    tolerance = from_settings(run.stats["settings"]).sweep_tolerance
+    return {name: tolerance * most for name, most in left(run.problem.system, run.stats["dt"], float(run.t[-1])).items()}
+
+
+def left(system: SkewGradient, dt: float, end: float) -> dict[str, float]:
+    """What sweeps leave of positions, angles and their rates at the time `end`, in units of their tolerance.
+
+    A step's sweeps end when they change its moves by no more than their tolerance, in units of the scale. What is then missing of
+    the steps adds up, in the worst case linearly.
+    """
+    moves = {name: LEFT * end / dt * scale for name, scale in _scales(system).items()}
+    length = float(system.scale[0])
+    rates = {"omega": 1.0, "phi_rate": 1.0, "x_rate": length, "y_rate": length}
+    return moves | {name: LEFT_RATE * scale / dt for name, scale in rates.items()}
+
+
+def sweeps_to(problem: Problem, bound: Mapping[str, float], size: Mapping[str, float], dt: float, end: float) -> float:
+    """The tolerance of sweeps with which they leave at most SWEPT of what the tolerances `bound` allow."""
+    most = left(problem.system, dt, end)
+    parts = [tol * size.get(name, 1.0) / most.get(name, LEFT_RATE * end / dt) for name, tol in bound.items()]
+    return max(SWEPT * min(parts), LEAST_SWEPT)
+
+
+def nudged(problem: Problem) -> Problem:
+    """The problem from positions and angles one unit in the last place away, to either side."""
+    start, rng = problem.initial, np.random.default_rng(0)
+
+    def nudge(value: NDArray) -> NDArray:
+        return np.nextafter(value, value + rng.choice((-1.0, 1.0), value.shape))
+
+    moved = {name: nudge(np.array(getattr(start, name))) for name in problem.system.rows}
+    rates = {"omega": start.omega, "phi_rate": start.phi_rate}
+    return replace(problem, initial=State(**moved, **rates))
+
+
+def _scales(system: SkewGradient) -> dict[str, float]:
+    return dict(zip(system.rows, system.scale.tolist(), strict=True))
