@@ -158,7 +158,7 @@ def run_stability(options: argparse.Namespace) -> None:
         raise
     write_stability(found, options.out)
     archive.unlink()  # a later run starts anew
-    print(found.grid(), found.summary(), sep="\n\n")
+    print(found.grid(), found.summary(), found.promise(), sep="\n\n")
     print(f"\nwritten to {options.out}: stability.md, stability.csv, stability.png")
 
 

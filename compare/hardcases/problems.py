@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from compare.hardcases.runs import EXPLICIT, FRAMES, PEERS, Found, march, motion, peer, posed
+from compare.hardcases.runs import EXPLICIT, FRAMES, PEERS, Found, march, motion, peer, posed, reference_of
 from compare.lump import lump
+from compare.reference import distance
 from compare.results import Growth
 from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.dispersion import frequency, growth, symbols
@@ -87,7 +88,9 @@ def rounding(make: Callable[[], Problem], dt: float, method: str, seconds: float
         return again._replace(says=f"started elsewhere: {again.says}")
     c, d, x, y = np.cos(angle), np.sin(angle), other[0] - move[0], other[1] - move[1]
     back = np.array([c * x + d * y, c * y - d * x, other[2]])
-    return found._replace(error=float(np.abs(back - q).max()))
+    known = reference_of(make)
+    off = np.nan if known is None else distance(q, known)
+    return found._replace(error=float(np.abs(back - q).max()), off=off)
 
 
 def rolling_waves(
@@ -130,7 +133,9 @@ def rolling_waves(
     measured = np.log(size[half:].max(axis=0) / size[: half + 1].max(axis=0)) / (duration / 2)
     error = float(np.abs(measured - rate).max())
     note = f"rates {measured.min():.3g} to {measured.max():.3g}, by the relation {rate.min():.3g} to {rate.max():.3g}"
-    return found._replace(error=error, note=note), Growth(q, np.asarray(measured, dtype=float), rate)
+    rolled = straight[3] * duration  # the waves stay far below what counts as off
+    off = distance(np.array([run.x[-1], run.y[-1], run.theta[-1]]), np.array([straight[0], rod.radius * rolled, rolled]))
+    return found._replace(error=error, note=note, off=off), Growth(q, np.asarray(measured, dtype=float), rate)
 
 
 def waves(n: int, rolling: str, stiffness: float, duration: float, method: str, seconds: float, multiple: float = 0.5) -> Found:

@@ -16,17 +16,22 @@ from compare.reference import distance, reference
 from discs import Problem, SimulationError, Solution, simulate, suggest_dt
 from discs.arrays import Float
 from discs.integrators import Integrator
-from discs.running.tolerance import to_tolerance
+from discs.running.tolerance import USUAL, NotReached, to_tolerance
 from discs.simulation import LOST
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")
 FIXED = (*CONSERVING, *GAUSS, *EXPLICIT)  # methods with a fixed step: a tolerance hides waves and rounding
-OURS = (*FIXED, "auto")
+OURS = (*FIXED, "auto", "default")
 PEERS = ("SciPy Radau", "SciPy BDF", "SciPy DOP853", "CVODE BDF-5")
 TOL, RTOL = 1e-4, 1e-6  # of "auto", and of the peers
+SEARCHED = {"auto": TOL, "default": USUAL}  # "default" is `simulate(problem)` with nothing set
+WRONG = 0.05  # relative error of positions, angles or energy that needs a warning
 LOOSE = LOST  # a run is lost if its relative error of the energy exceeds this
 FRAMES = 101
+REFERENCES = 1000, 4000, 16_000  # steps of "gauss8", of which two runs must agree to KNOWN
+KNOWN = 1e-3
+MOST_WORK = 2e7  # steps times discs of a reference
 
 
 class Found(NamedTuple):
@@ -37,6 +42,7 @@ class Found(NamedTuple):
     t : time reached. dt : step, NaN if the method chooses. error : largest, relative to the largest value of each of x, y, theta
     (or as the case defines it), NaN if unknown. energy : largest relative error over the frames, of peers at the end.
     residual : of rolling, length per time. says : its error or warnings. note : other measurements of the case.
+    off : largest error of positions and angles at the end, relative to the largest of each; NaN without a reference.
     """
 
     outcome: str
@@ -50,6 +56,7 @@ class Found(NamedTuple):
     seconds: float = np.nan
     says: str = ""
     note: str = ""
+    off: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -104,16 +111,21 @@ def posed(make: Callable[[], Problem]) -> Problem:
 
 
 @lru_cache(2)
-def _known(make: Callable[[], Problem], exact: Callable[[Problem], Float] | None) -> Float | None:
-    """Positions at the end: exact, or by short steps of "gauss8" if these agree."""
+def reference_of(make: Callable[[], Problem], exact: Callable[[Problem], Float] | None = None) -> Float | None:
+    """Positions at the end: exact, or by short steps of "gauss8" if these agree, as they do not where a motion is sensitive."""
     problem = posed(make)
     if exact is not None:
         return exact(problem)
-    try:
-        q, floor = reference(problem)
-    except SimulationError:
-        return None
-    return q if floor < 1e-4 else None
+    for steps in (steps for steps in REFERENCES if steps * problem.chain.n <= MOST_WORK):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                q, floor = reference(problem, steps)
+        except SimulationError:
+            continue
+        if floor < KNOWN:
+            return q
+    return None
 
 
 class Slow(Exception):
@@ -158,23 +170,28 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         try:
-            if method == "auto":
-                done = to_tolerance(problem, "auto", TOL, times, run)
+            if method in SEARCHED:
+                done = to_tolerance(problem, "auto", SEARCHED[method], times, run)
             else:
                 dt = suggest_dt(problem, method) if dt is None else dt
                 done = run(problem, method, dt, times)
         except ValueError as error:
             return Found("refused", 0.0, seconds=spent(), says=str(error)), None
         except (SimulationError, ArithmeticError) as error:
+            if method == "default" and isinstance(error, NotReached):
+                return _done(error.best, _told([*heard, error]), sum(cost)), error.best
             says = _told([*heard, error])
             return Found("stopped", getattr(error, "time", np.nan), dt or np.nan, seconds=spent(), says=says), None
         except Slow as error:
             return Found("cut off", dt=dt or np.nan, seconds=error.seconds, says="predicted from its first steps, not run"), None
-    drift = float(np.abs(done.energy / done.energy[0] - 1).max())
-    says = _told(heard)
-    slip = float(done.rolling_residual.max()) if done.rolling_residual is not None else np.nan
-    stats = done.stats
-    return Found("done", done.t[-1], stats["dt"], np.nan, drift, slip, stats["unconverged"], stats["steps"], sum(cost), says), done
+    return _done(done, _told(heard), sum(cost)), done
+
+
+def _done(run: Solution, says: str, seconds: float) -> Found:
+    drift = float(np.abs(run.energy / run.energy[0] - 1).max())
+    slip = float(run.rolling_residual.max()) if run.rolling_residual is not None else np.nan
+    stats = run.stats
+    return Found("done", run.t[-1], stats["dt"], np.nan, drift, slip, stats["unconverged"], stats["steps"], seconds, says)
 
 
 def _told(heard: Sequence[warnings.WarningMessage | Exception]) -> str:
@@ -244,5 +261,8 @@ def motion(
         q = None if run is None else np.array([getattr(run, row)[-1] for row in problem.system.rows])
         if run is not None and note is not None:
             found = found._replace(note=note(problem, run))
-    known = _known(make, exact) if q is not None and (compared or exact) else None
-    return found if q is None or known is None else found._replace(error=distance(q, known))
+    known = None if q is None else reference_of(make, exact)
+    if q is None or known is None:
+        return found
+    off = distance(q, known)
+    return found._replace(off=off, error=off if compared or exact else np.nan)

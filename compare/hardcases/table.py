@@ -16,10 +16,11 @@ from compare import figures
 from compare.background import background
 from compare.hardcases.cases import Case, cases
 from compare.hardcases.problems import rolling_waves
-from compare.hardcases.runs import OURS, PEERS, RTOL, TOL, Found
+from compare.hardcases.runs import OURS, PEERS, RTOL, TOL, WRONG, Found
 from compare.results import Growth
 from compare.sweeps import Result, read, sweep
 from discs import checks
+from discs.running.tolerance import USUAL
 
 SECONDS = {True: 1.0, False: 60.0}  # limit for a run: quick, or not
 PEER_SECONDS = 2.0  # peers are many, and slow
@@ -36,6 +37,17 @@ class Row(NamedTuple):
     verdict: str
     expected: str
     found: Found
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it ran to the end with an error above `WRONG` in positions, angles or energy."""
+        f = self.found
+        return f.outcome == "done" and (f.off > WRONG or not f.energy <= WRONG)
+
+    @property
+    def warned(self) -> bool:
+        """Whether the run says that it may be wrong."""
+        return bool(self.found.says or self.found.unconverged)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +68,26 @@ class Stability:
         """Runs of ours that did not meet the expectation."""
         return [row for row in self.rows if row.expected == "NO"]
 
+    @property
+    def unsaid(self) -> list[Row]:
+        """Runs of ours that are wrong without a warning, and default runs above their tolerance without one."""
+        ours = [row for row in self.rows if row.method in OURS and not row.warned]
+        return [row for row in ours if row.wrong or (row.method == "default" and row.found.off > USUAL)]
+
+    def promise(self) -> str:
+        """How many runs of ours are wrong, and which of them have no warning, in lines of Markdown."""
+        ended = [row for row in self.rows if row.method in OURS and row.found.outcome == "done"]
+        known, wrong = sum(bool(np.isfinite(row.found.off)) for row in ended), sum(row.wrong for row in ended)
+        lines = [
+            f"{len(ended)} runs of ours ran to the end, {known} have a reference. {wrong} are wrong by more than {100 * WRONG:g} % in "
+            f"positions, angles or energy. Of these, and of default runs with an error above {USUAL:g}, {len(self.unsaid)} are without "
+            f"a warning{':' if self.unsaid else '.'}"
+        ]
+        for row in self.unsaid:
+            off = f"error {_short(row.found.off)}, energy {_short(row.found.energy)}"
+            lines.append(f"* {row.case}, {row.setting}, `{row.method}`, h = {_short(row.found.dt)}: {off}")
+        return "\n".join(lines)
+
     def grid(self) -> str:
         """Cases by methods, as a table in Markdown; bold marks failures of ours."""
         at = {(row.case, row.setting, row.method): row for row in self.rows}
@@ -69,11 +101,12 @@ class Stability:
 
     def table(self) -> str:
         """All runs, as a table in Markdown."""
-        head = "case", "method", "as expected", "result", "t", "h", "error", "energy", "slip", "unconverged", "steps", "s", "remark"
+        words = "case", "method", "as expected", "result", "t", "h", "error", "off", "energy", "slip"
+        head = (*words, "unconverged", "steps", "s", "remark")
         lines = [f"| {' | '.join(head)} |", "| --- " * len(head) + "|"]
         for row in self.rows:
             f = row.found
-            numbers = [_short(v) for v in (f.t, f.dt, f.error, f.energy, f.residual)]
+            numbers = [_short(v) for v in (f.t, f.dt, f.error, f.off, f.energy, f.residual)]
             says = "; ".join(part for part in (f.note, _first(f.says)) if part).replace("|", "\\|")
             cells = [
                 f"{row.case}: {row.setting}",
@@ -107,15 +140,16 @@ class Stability:
             "with time and disc. refused: an error before the start. failed: a peer's error. cut off: predicted to exceed its "
             "time. †: some steps did not converge. ·: not run, as the case does not apply: a tolerance hides waves and rounding, "
             "and the parasitic mode belongs to the two-step scheme. Bold: a method of ours that did not meet the expectation. "
-            f"auto runs to {TOL:g}, peers to rtol {RTOL:g}; the energy of peers is that at the end, and their variables "
-            "satisfy rolling exactly. Seconds are processor time."
+            f"auto runs to {TOL:g}, default is `simulate(problem)` with nothing set, to {USUAL:g}; peers run to rtol {RTOL:g}; the "
+            "energy of peers is that at the end, and their variables satisfy rolling exactly. error: as the case defines it; off: of "
+            "positions and angles at the end, relative to the largest of each. Seconds are processor time."
         )
 
     def report(self) -> str:
         """Everything, in Markdown."""
         wants = dict.fromkeys(_wanted(case) for case in self.cases)
-        parts = ["# Hard cases", self.summary(), self.words, self.grid(), "## What is expected", "\n".join(wants), "## All runs"]
-        return "\n\n".join([*parts, self.table()])
+        told = [self.promise(), self.summary(), self.words, self.grid()]
+        return "\n\n".join(["# Hard cases", *told, "## What is expected", "\n".join(wants), "## All runs", self.table()])
 
     def save(self, path: str | Path) -> None:
         """All runs, as CSV."""

@@ -16,6 +16,7 @@ from compare.hardcases import table as stability_table
 from compare.hardcases.cases import cases
 from compare.hardcases.problems import rolling_waves
 from compare.hardcases.runs import CONSERVING, EXPLICIT, FIXED, GAUSS, OURS, PEERS, Expectation, Found
+from compare.hardcases.table import Row, Stability
 from compare.sweeps import read
 from continuum import untwisting_rod
 from continuum.dispersion import growth
@@ -24,6 +25,7 @@ from discs import simulate
 
 SMALL = cases(quick=True)
 FAILS = {("rolling straight rod, unit law", "rk4")}  # Runge and Kutta's scheme damps the waves it does not resolve
+UNKNOWN: set[tuple[str, str]] = set()  # motions that amplify rounding, without a reference
 # would take longer than they are given
 SLOW = {("rounding", "N = 1025", method) for method in ("leapfrog", "mclachlan-perlmutter", "rk4")}
 
@@ -39,6 +41,32 @@ def test_ours_do_as_expected_but_for_what_is_known(table):
     assert {(row.case, row.method) for row in table.failures} == FAILS
     assert len(table.rows) == sum(method in case.methods for case in SMALL for method in OURS)
     assert {(row.case, row.setting, row.method) for row in table.rows if not row.expected} <= SLOW
+
+
+def test_no_run_is_wrong_without_a_word(table):
+    """Runs of ours are held against a reference wherever there is one: most rows that went to the end."""
+    assert not table.unsaid
+    assert "0 are without a warning." in table.promise()
+    ended = [row for row in table.rows if row.found.outcome == "done" and row.case != "parasitic mode"]
+    unknown = {(row.case, row.setting) for row in ended if np.isnan(row.found.off)}
+    assert unknown <= UNKNOWN
+    assert sum(row.wrong for row in table.rows) > 10  # and say so
+    default = [row for row in table.rows if row.method == "default" and row.found.outcome == "done"]
+    assert len(default) > 10
+    assert all(row.found.off < 1e-3 or row.warned for row in default if row.found.off >= 0)
+
+
+def test_a_run_that_is_wrong_without_a_word_is_told():
+    case = SMALL[0]
+    quiet, loud = Found("done", off=0.06, energy=1e-9), Found("done", off=0.06, energy=1e-9, says="too long")
+    right, lost, slow = Found("done", off=0.04, energy=1e-9), Found("done", energy=np.nan), Found("cut off", off=0.5)
+    by = {"midpoint": quiet, "suzuki4": loud, "gauss4": right, "gauss6": lost, "gauss8": slow, "SciPy BDF": quiet}
+    rows = [Row(case.name, case.setting, method, "holds", "yes", found) for method, found in by.items()]
+    rows += [Row("long time", "", "default", "holds", "yes", Found("done", off=off, energy=0.0)) for off in (5e-4, 2e-3)]
+    study = Stability(rows, SMALL)
+    assert [row.method for row in study.unsaid] == ["midpoint", "gauss6", "default"]
+    assert "3 are off by more than 5 %" in study.promise()
+    assert "3 are without a warning:\n* step above the explicit limit, N = 33, h = 1 k, `midpoint`" in study.promise()
 
 
 def one(table, name, setting, method):
