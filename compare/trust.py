@@ -4,8 +4,9 @@ A scene is drawn (`compare.random_scenes`), and a tolerance for each of the two.
 
 * chains : N discs, 2N and 4N, with ends of second order, extrapolated by the law 1/N^2: another discretisation. Their error is the
   change from one extrapolation to the next over three (`continuum.solver`), and that of their steps. They reach 1e-4 to 1e-6.
-* finer : where chains err by more than a fifth of the tolerance, the field itself to a tenth of it. It is another run and not
-  another kind, so chains are compared too: `unlike` says by how many times their own error they differ from it.
+* finer : where chains err by more than a fifth of the tolerance, the field itself to a tenth of it, and to a fifth of its estimate:
+  it would be the same run where that is small. It is another run and not another kind, so chains are compared too: `unlike` says by
+  how many times their own error they differ from it.
 * gauss8 : of discs, "gauss8" with steps eight times shorter; its error is what steps four times shorter change.
 
 A reference that errs by more than a fifth of the tolerance is none, and the row says so. A run is given so many seconds of
@@ -109,7 +110,7 @@ def field_row(drawn: Drawn, row: Row, seconds: float) -> Row:
             error = _apart(scene, found, other, names)
             if off <= row.tol / LEAST:
                 return _judged(row, error, off, "chains")
-            finer = solve(scene, row.tol / FINER, frames=FRAMES, progress=False)
+            finer = solve(scene, min(row.tol / FINER, estimate / LEAST), frames=FRAMES, progress=False)
             own = max((finer.error_estimate or {})[name] for name in names)
             unlike = _apart(scene, finer, other, names) / off
             row = row._replace(unlike=unlike)

@@ -24,8 +24,8 @@ from continuum.scenes import rolling_rod
 from discs import simulate
 
 SMALL = cases(quick=True)
+TABLED = (*FIXED, "auto")  # default runs are a test of their own
 FAILS = {("rolling straight rod, unit law", "rk4")}  # Runge and Kutta's scheme damps the waves it does not resolve
-UNKNOWN: set[tuple[str, str]] = set()  # motions that amplify rounding, without a reference
 # would take longer than they are given
 SLOW = {("rounding", "N = 1025", method) for method in ("leapfrog", "mclachlan-perlmutter", "rk4")}
 
@@ -34,26 +34,31 @@ SLOW = {("rounding", "N = 1025", method) for method in ("leapfrog", "mclachlan-p
 def table():
     """Every case by every method of ours."""
     with ThreadPoolExecutor(1) as here:
-        return stability(True, methods=OURS, seconds=4.0, executor=here, progress=False)
+        return stability(True, methods=TABLED, seconds=4.0, executor=here, progress=False)
 
 
 def test_ours_do_as_expected_but_for_what_is_known(table):
     assert {(row.case, row.method) for row in table.failures} == FAILS
-    assert len(table.rows) == sum(method in case.methods for case in SMALL for method in OURS)
+    assert len(table.rows) == sum(method in case.methods for case in SMALL for method in TABLED)
     assert {(row.case, row.setting, row.method) for row in table.rows if not row.expected} <= SLOW
 
 
-def test_no_run_is_wrong_without_a_word(table):
-    """Runs of ours are held against a reference wherever there is one: most rows that went to the end."""
-    assert not table.unsaid
-    assert "0 are without a warning." in table.promise()
-    ended = [row for row in table.rows if row.found.outcome == "done" and row.case != "parasitic mode"]
-    unknown = {(row.case, row.setting) for row in ended if np.isnan(row.found.off)}
-    assert unknown <= UNKNOWN
-    assert sum(row.wrong for row in table.rows) > 10  # and say so
-    default = [row for row in table.rows if row.method == "default" and row.found.outcome == "done"]
-    assert len(default) > 10
-    assert all(row.found.off < 1e-3 or row.warned for row in default if row.found.off >= 0)
+def test_no_run_is_wrong_without_a_word():
+    """Steps of 64 k are far too long for the motion, which converged steps do not show; the default run is near."""
+    with ThreadPoolExecutor(1) as here:
+        names = ("step above the explicit limit", "strong twist")
+        study = stability(True, names, ("midpoint", "default"), seconds=4.0, executor=here, progress=False)
+    assert not study.unsaid
+    assert "0 are without a warning." in study.promise()
+    at = {(row.setting, row.method): row for row in study.rows if row.method == "default" or row.case == names[0]}
+    for n in (33, 129):
+        short, long = (at[f"N = {n}, h = {multiple} k", "midpoint"] for multiple in (1, 64))
+        assert short.found.off < 0.05
+        assert long.wrong
+        assert long.warned
+    default = [row.found for row in study.rows if row.method == "default"]
+    assert len(default) == 2
+    assert all(found.off < 1e-3 and not found.says for found in default)
 
 
 def test_a_run_that_is_wrong_without_a_word_is_told():
@@ -112,14 +117,14 @@ def test_the_limp_rod_is_said_to_be_ill_posed(table):
     assert all("ill posed" in row.found.says for row in limp)
 
 
-@pytest.mark.parametrize("method", OURS)
+@pytest.mark.parametrize("method", TABLED)
 def test_the_ring_stops_in_time(table, method):
     assert one(table, "collapsing ring, unit law", "N = 32", method).found.error < 0.05  # some steps of 0.015
 
 
 def test_points_turn_as_the_exact_wave_by_every_method(table):
     found = {row.method: row.found for row in table.rows if row.setting == "R = 0"}
-    assert set(found) == set(OURS)
+    assert set(found) == set(TABLED)
     assert all(found[method].error < 1e-6 for method in ("suzuki4", "kahanli6", "gauss4", "gauss6", "gauss8", "rk4", "auto"))
 
 

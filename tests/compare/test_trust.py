@@ -94,6 +94,20 @@ def test_wrong_fields_are_found_out(monkeypatch):
     assert "unlike the chains: 0:10" in Trust([row], []).summary()
 
 
+def test_a_finer_field_is_another_run(monkeypatch):
+    """A field that errs by far less than its tolerance is within a tenth of it too, and would be held against itself."""
+    asked, true = [], module.solve
+
+    def careful(scene, tol, **options):
+        asked.append(tol)
+        found = true(scene, 1e-5, **options)
+        return replace(found, error_estimate=dict.fromkeys(found.error_estimate, tol / 50))
+
+    monkeypatch.setattr(module, "solve", careful)
+    assert rows_of(10)[0].reference == "finer"
+    assert asked[1] == pytest.approx(asked[0] / 50 / LEAST)
+
+
 def test_wrong_runs_are_found_out(monkeypatch):
     true = module.simulate
 
