@@ -79,9 +79,9 @@ class Stability:
         ended = [row for row in self.rows if row.method in OURS and row.found.outcome == "done"]
         known, wrong = sum(bool(np.isfinite(row.found.off)) for row in ended), sum(row.wrong for row in ended)
         lines = [
-            f"{len(ended)} runs of ours ran to the end, {known} have a reference. {wrong} are wrong by more than {100 * WRONG:g} % in "
-            f"positions, angles or energy. Of these, and of default runs with an error above {USUAL:g}, {len(self.unsaid)} are without "
-            f"a warning{':' if self.unsaid else '.'}"
+            f"{len(ended)} runs of ours ran to the end, {known} have a reference. {wrong} are wrong by more than {100 * WRONG:g} % "
+            f"in positions, angles or energy. Of these, and of default runs with an error above {USUAL:g}, {len(self.unsaid)} are "
+            f"without a warning{':' if self.unsaid else '.'}"
         ]
         for row in self.unsaid:
             off = f"error {_short(row.found.off)}, energy {_short(row.found.energy)}"
@@ -141,8 +141,8 @@ class Stability:
             "time. †: some steps did not converge. ·: not run, as the case does not apply: a tolerance hides waves and rounding, "
             "and the parasitic mode belongs to the two-step scheme. Bold: a method of ours that did not meet the expectation. "
             f"auto runs to {TOL:g}, default is `simulate(problem)` with nothing set, to {USUAL:g}; peers run to rtol {RTOL:g}; the "
-            "energy of peers is that at the end, and their variables satisfy rolling exactly. error: as the case defines it; off: of "
-            "positions and angles at the end, relative to the largest of each. Seconds are processor time."
+            "energy of peers is that at the end, and their variables satisfy rolling exactly. error: as the case defines it; off: "
+            "of positions and angles at the end, relative to the largest of each. Seconds are processor time."
         )
 
     def report(self) -> str:

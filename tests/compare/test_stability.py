@@ -43,13 +43,13 @@ def test_ours_do_as_expected_but_for_what_is_known(table):
     assert {(row.case, row.setting, row.method) for row in table.rows if not row.expected} <= SLOW
 
 
-def test_no_run_is_wrong_without_a_word():
+def test_no_run_is_wrong_without_a_warning():
     """Steps of 64 k are far too long for the motion, which converged steps do not show; the default run is near."""
     with ThreadPoolExecutor(1) as here:
         names = ("step above the explicit limit", "strong twist")
         study = stability(True, names, ("midpoint", "default"), seconds=4.0, executor=here, progress=False)
     assert not study.unsaid
-    assert "0 are without a warning." in study.promise()
+    assert " 0 are without a warning." in study.promise()
     at = {(row.setting, row.method): row for row in study.rows if row.method == "default" or row.case == names[0]}
     for n in (33, 129):
         short, long = (at[f"N = {n}, h = {multiple} k", "midpoint"] for multiple in (1, 64))
@@ -61,7 +61,7 @@ def test_no_run_is_wrong_without_a_word():
     assert all(found.off < 1e-3 and not found.says for found in default)
 
 
-def test_a_run_that_is_wrong_without_a_word_is_told():
+def test_a_run_that_is_wrong_without_a_warning_is_told():
     case = SMALL[0]
     quiet, loud = Found("done", off=0.06, energy=1e-9), Found("done", off=0.06, energy=1e-9, says="too long")
     right, lost, slow = Found("done", off=0.04, energy=1e-9), Found("done", energy=np.nan), Found("cut off", off=0.5)
@@ -70,7 +70,7 @@ def test_a_run_that_is_wrong_without_a_word_is_told():
     rows += [Row("long time", "", "default", "holds", "yes", Found("done", off=off, energy=0.0)) for off in (5e-4, 2e-3)]
     study = Stability(rows, SMALL)
     assert [row.method for row in study.unsaid] == ["midpoint", "gauss6", "default"]
-    assert "3 are off by more than 5 %" in study.promise()
+    assert "3 are wrong by more than 5 %" in study.promise()
     assert "3 are without a warning:\n* step above the explicit limit, N = 33, h = 1 k, `midpoint`" in study.promise()
 
 
