@@ -8,6 +8,7 @@ import pytest
 
 from continuum import solve, untwisting_rod
 from discs import Chain, Problem, State, SteeredChain
+from discs.kernels import driver
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job: tests send Ctrl-C, to themselves and to children
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -83,6 +84,13 @@ def uneven(n: int, model: Model, seed: int = 1, *, equal: bool = False) -> Probl
     else:
         chain = Chain(**common, rolling=law)
     return Problem(chain, State(x, y, theta, omega), 1.0)
+
+
+@pytest.fixture
+def kernels_as_python(monkeypatch):
+    """Kernels run as plain Python, to the arithmetic's last bits but one: what no user has compiled ahead takes 20 s to compile."""
+    for name in ("march", "look", "observe", "reduced"):
+        monkeypatch.setattr(driver, name, getattr(driver, name).__wrapped__)
 
 
 @pytest.fixture(scope="session")

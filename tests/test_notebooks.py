@@ -40,6 +40,7 @@ def test_has_the_form_of_a_lesson(path):
         assert target.startswith("https://") or (path.parent / target).exists()
 
 
+@pytest.mark.slow
 @each
 def test_runs(path):
     notebook = nbformat.read(path, as_version=4)

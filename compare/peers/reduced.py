@@ -16,8 +16,11 @@ from discs.arrays import Float
 from discs.integrators.ivp import Reduced
 
 
-def bound(problem: Problem) -> Callable[[float, Float, Float], None]:
-    """f(t, y, out), compiled for one chain, whose parameters become constants of the code; without a compiled form, in NumPy."""
+def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
+    """f(t, y, out), compiled for one chain, whose parameters become constants of the code; without a compiled form, in NumPy.
+
+    Compiled once, for arrays like y that must not change, as SUNDIALS hands them over; SciPy's are taken as such.
+    """
     if problem.system.kernel is None:
         plain = Reduced(problem.system)
 
@@ -34,6 +37,8 @@ def bound(problem: Problem) -> Callable[[float, Float, Float], None]:
     def f(t, y, out):  # type: ignore[no-untyped-def]
         inner(chain, t, y, out)
 
+    f(0.0, read_only(y), np.empty_like(y))
+    f.disable_compile()  # type: ignore[attr-defined]
     return f
 
 
@@ -53,7 +58,7 @@ class Bound:
     """
 
     def __init__(self, problem: Problem, f: Callable[[float, Float, Float], None] | None = None) -> None:
-        self.f, self.calls, self.until = f or bound(problem), 0, np.inf
+        self.calls, self.until = 0, np.inf
         self.reduced = Reduced(problem.system)
         z = problem.start()
         self.y0 = self.reduced.join(z.hi, z.pi)
@@ -61,8 +66,8 @@ class Bound:
         share = np.sqrt(np.where(spin > 0, spin, mass))
         # pi of a disc scales like the root of its share of the length, and so do the allowed errors
         self.unit = self.reduced.join(np.ones_like(z.hi), np.ones_like(z.pi) * share)
-        for y in (self.y0, read_only(self.y0)):  # compiled for both before anything is timed
-            self(0.0, y)
+        self.f = f or bound(problem, self.y0)
+        self(0.0, self.y0)  # compiled before anything is timed
 
     def start(self, seconds: float) -> None:
         """Start counting."""

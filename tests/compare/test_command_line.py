@@ -11,6 +11,8 @@ from compare.__main__ import main
 from compare.outputs import fresh_files
 from continuum import breathing_ring
 
+pytestmark = pytest.mark.slow
+
 FILES = ["convergence.csv", "convergence.png", "energy.png", "motion.png"]
 
 

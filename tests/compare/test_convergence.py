@@ -9,6 +9,8 @@ from compare import convergence, lump
 from compare.results import write_csv
 from continuum import breathing_ring, solve, untwisting_rod
 
+pytestmark = pytest.mark.slow
+
 
 def test_consistent_ends_converge_at_order_two(paper_field):
     study = convergence(untwisting_rod(), (129, 257, 513), "consistent", field=paper_field, progress=False)

@@ -9,6 +9,8 @@ pytest.importorskip("exudyn", reason="the peer exudyn is not installed (extra [p
 
 from compare.peers.exudyn_chain import exudyn_steered
 
+pytestmark = pytest.mark.slow
+
 PAPER = {
     "density": 1.0,
     "spin_inertia": 1.0,

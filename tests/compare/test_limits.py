@@ -7,6 +7,8 @@ import pytest
 
 from compare.limits import limits
 
+pytestmark = pytest.mark.slow
+
 UNIT = "unit law, true curvature"
 
 

@@ -7,6 +7,8 @@ from compare import lump
 from continuum import solve, untwisting_rod
 from discs import simulate
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.filterwarnings("ignore:.* is too long for this motion")
 @pytest.mark.parametrize("multiple", [1, 4, 16])

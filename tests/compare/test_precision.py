@@ -17,6 +17,8 @@ from discs import Problem
 from discs.kernels import driver
 from tests.conftest import Model, uneven
 
+pytestmark = pytest.mark.slow
+
 # a short motion: peers whose error is that of their tolerances come close
 SHORT = {
     "unit": lump(untwisting_rod(rolling="unit", duration=0.4), 9),

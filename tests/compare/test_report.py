@@ -16,6 +16,8 @@ from compare.__main__ import main
 from compare.hardcases.cases import cases
 from compare.report import Page, report
 
+pytestmark = pytest.mark.slow
+
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync --disable-dev-shm-usage --window-size=1200,1000"

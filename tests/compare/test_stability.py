@@ -23,6 +23,8 @@ from continuum.dispersion import growth
 from continuum.scenes import rolling_rod
 from discs import simulate
 
+pytestmark = pytest.mark.slow
+
 SMALL = cases(quick=True)
 TABLED = (*FIXED, "auto")  # default runs are a test of their own
 FAILS = {("rolling straight rod, unit law", "rk4")}  # Runge and Kutta's scheme damps the waves it does not resolve

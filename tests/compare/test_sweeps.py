@@ -19,6 +19,8 @@ from compare.sweeps import read
 from continuum import untwisting_rod
 from discs import simulate
 
+pytestmark = pytest.mark.slow
+
 
 def end_disc(case):
     """Where the end disc of a short motion is; importable, so that other processes can run it."""

@@ -13,6 +13,8 @@ from compare.random_scenes import KINDS, PARAMETERS, random_scene
 from compare.trust import at_most, examine, trust
 from compare.trust_table import LEAST, MOST, Row, Trust
 
+pytestmark = pytest.mark.slow
+
 SAMPLE = (5, 7, 10, 14)  # own headings, both laws, free and closed; chosen for their time only
 
 

@@ -10,6 +10,8 @@ from continuum.__main__ import main
 from discs import load
 from tests.discs.test_archive import same
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def ring(tmp_path):

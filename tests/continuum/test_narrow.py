@@ -10,6 +10,8 @@ from continuum.galerkin import SpectralRod
 from continuum.initial import resolve
 from continuum.scenes import PAPER
 
+pytestmark = pytest.mark.slow
+
 
 def scene(rolling="field", closed=False, duration=1.0, **fields):
     """A straight rod with other initial fields by name."""

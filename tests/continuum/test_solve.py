@@ -12,6 +12,8 @@ from continuum.mesh import semidiscretise
 from continuum.scenes import PAPER
 from discs import Midpoint, SimulationError, Suzuki4, simulate
 
+pytestmark = pytest.mark.slow
+
 FINE = Suzuki4(Midpoint(tolerance=1e-11))
 
 

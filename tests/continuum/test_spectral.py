@@ -18,6 +18,8 @@ from discs.integrators.base import Work
 from discs.integrators.collocation import tableau
 from discs.skew import Phase
 
+pytestmark = pytest.mark.slow
+
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
 POSITIONS = ("x", "y", "theta")
 

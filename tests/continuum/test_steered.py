@@ -13,6 +13,8 @@ from continuum.mesh import semidiscretise
 from continuum.scenes import PAPER
 from discs import Midpoint, SimulationError, Suzuki4, simulate
 
+pytestmark = pytest.mark.slow
+
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.8, "radius": 0.7, "length": 3.1}
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 LONG = pytest.mark.filterwarnings("ignore:midpoint. dt = .* is too long for this motion")  # stability in long steps is tested

@@ -12,6 +12,8 @@ from discs import SimulationError
 from discs.kernels import limits
 from discs.skew import Phase
 
+pytestmark = pytest.mark.slow
+
 
 def largest(a, b):
     return max(np.abs(a[name] - b[name]).max() for name in ("x", "y", "theta"))

@@ -16,6 +16,8 @@ from discs.__main__ import main, parser
 from discs.chains.twist import untwisting_chain
 from tests.discs.test_archive import same
 
+pytestmark = pytest.mark.slow
+
 
 def test_run_saves_what_simulate_gives(tmp_path, capsys):
     path = tmp_path / "run.nc"

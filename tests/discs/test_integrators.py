@@ -15,7 +15,7 @@ from tests.conftest import ALL, SLAVED, STEERED, Model, models, models_and_engin
 from tests.discs.test_system import contact_from_the_definition
 
 # long steps, to be well above rounding
-pytestmark = pytest.mark.filterwarnings("ignore:.* is too long for this motion")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:.* is too long for this motion")]
 
 FIXED = [name for name, cls in METHODS.items() if not cls.adaptive]
 ADAPTIVE = [name for name, cls in METHODS.items() if cls.adaptive]

@@ -13,6 +13,8 @@ from discs.integrators import METHODS
 from discs.running import recording, time_loop
 from tests.conftest import Model, uneven
 
+pytestmark = pytest.mark.slow
+
 
 def pressing(seconds: float):
     """Another process that presses Ctrl-C: a thread of this one could not, while a compiled call keeps Python to itself."""

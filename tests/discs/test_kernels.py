@@ -20,6 +20,8 @@ from discs.kernels import banded, blocks, compiled, steered_links
 from discs.running import time_loop
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 
+pytestmark = pytest.mark.slow
+
 COMPILED = SLAVED + STEERED
 SIZES = [2, 3, 4, 5, 6, 7, 8, 9, 12, 31]
 # rounding differs in the order of sums: a few units in the last place, times what an unconverged sweep of a stiff step leaves

@@ -19,6 +19,8 @@ from discs.kernels import protocol as do
 from discs.kernels.slaved_matrix import GHOST, PLAIN, RING
 from tests.conftest import Model, uneven
 
+pytestmark = pytest.mark.slow
+
 RNG = np.random.default_rng(5)
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 

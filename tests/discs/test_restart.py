@@ -20,6 +20,8 @@ from discs.running import recording
 from tests.conftest import STEERED, Model, uneven
 from tests.discs.test_archive import same
 
+pytestmark = pytest.mark.slow
+
 OPEN = Model("springs", "field")
 
 

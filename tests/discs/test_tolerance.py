@@ -15,6 +15,8 @@ from discs.integrators import DOP853
 from discs.running.tolerance import ATTEMPTS, NotReached, to_tolerance
 from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
+pytestmark = pytest.mark.slow
+
 
 def true_error(problem, run):
     dt = min(problem.duration / 500, run.stats["dt"] / (2 if run.stats["method"] == "midpoint" else 8))

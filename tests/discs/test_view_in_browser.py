@@ -14,6 +14,8 @@ from discs.pictures.view import View
 from tests.conftest import Model, uneven
 from tests.discs.test_view import TITLES, pair, simulated, single
 
+pytestmark = pytest.mark.slow
+
 FLAGS = """--headless=new --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --window-size=700,600
     --disable-quic --no-first-run --disable-background-networking --disable-component-update
     --disable-sync --disable-dev-shm-usage"""
