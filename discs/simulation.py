@@ -2,6 +2,7 @@
 
 import time as clock
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -139,7 +140,7 @@ def _search(
 def lost_energy(problem: Problem, method: str, t: NDArray, energy: NDArray) -> str:
     """What to warn of where energies (F,) at times (F,) say that a run is not the motion it should be; empty where it may be."""
     off = np.abs(energy - problem.energy())
-    worst = int(np.argmax(off))
+    worst = int(off.argmax())
     if off[worst] <= LOST * problem.blown_up / 10:
         return ""
     return (
@@ -184,7 +185,7 @@ def _run(
     about: Stats = {
         "method": integrator.name,
         "order": integrator.order,
-        "settings": repr(integrator),
+        "settings": integrator.settings,
         "engine": "compiled" if compiled else "plain",
         "want": list(want),
         "dt": h,
@@ -193,27 +194,26 @@ def _run(
     about |= more or {}
     record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about, estimate)
     steps, rest = steps_before(end, h)
-    watch = Watch(steps, system.n) if checked and not integrator.adaptive else None
+    shown = Progress(integrator.name, steps) if progress else None
+    watch = Watch(steps, len(system.rows), system.n) if checked and not integrator.adaptive else None
     started = clock.perf_counter()
-    with (
-        np.errstate(over="ignore", invalid="ignore", divide="ignore"),
-        Progress(integrator.name, steps, progress) as shown,
-        record,
-    ):
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown or NO_BAR, record:
         if record.complete:
             return record.solution({})
         march = March(problem, integrator, h, compiled, not progress, watch)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
-        if march.step:
-            shown.update(march.step)
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)
-            for taken in march.to(before):
-                shown.update(taken)
-                record.pause(f, march)
+            while march.step < before:
+                march.on(before)
+                if shown is not None:
+                    shown.update(march.step)
+                if checkpoint is not None:
+                    record.pause(f, march)
             frame = partial(observed, march, rest, want, bool(offered))
             record.write(f, _uncut(frame, record, f, march))  # not kept here: the next step needs the room
-            record.pause(f + 1, march)
+            if checkpoint is not None:
+                record.pause(f + 1, march)
         work = march.work
         told: Stats = about | {"steps": march.step, "gradients": work.gradients, "solves": work.solves}
         told["unconverged"] = work.unconverged
@@ -237,9 +237,9 @@ def _uncut(call: Callable[[], Any], record: Rows, f: int, march: March) -> Any:
 class Progress:
     """A progress bar that is made only when a run has lasted a second: making one costs as much as a short run."""
 
-    def __init__(self, name: str, total: int, shown: bool) -> None:
-        self._name, self._total, self._shown = name, total, shown
-        self._done, self._started, self._bar = 0, clock.perf_counter(), None
+    def __init__(self, name: str, total: int) -> None:
+        self._name, self._total, self._started = name, total, clock.perf_counter()
+        self._bar: Any = None
 
     def __enter__(self) -> "Progress":
         return self
@@ -248,11 +248,14 @@ class Progress:
         if self._bar is not None:
             self._bar.close()
 
-    def update(self, steps: int) -> None:
-        self._done += steps
+    def update(self, step: int) -> None:
+        """Show that a run has come to a step."""
         if self._bar is not None:
-            self._bar.update(steps)
-        elif self._shown and clock.perf_counter() - self._started > 1:
+            self._bar.update(step - self._bar.n)
+        elif clock.perf_counter() - self._started > 1:
             from tqdm import tqdm
 
-            self._bar = tqdm(total=self._total, initial=self._done, desc=self._name, unit="step")
+            self._bar = tqdm(total=self._total, initial=step, desc=self._name, unit="step")
+
+
+NO_BAR = nullcontext()

@@ -156,8 +156,8 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
     run = March(problem, Leapfrog(), h, True, True)
     share, onset, energy, times = 0.0, np.nan, [], np.linspace(0, duration, 401)[1:]
     for t in times:
-        for _ in run.to(round(t / h)):
-            pass
+        while run.step < round(t / h):
+            run.on(round(t / h))
         z = run.memory
         c, v = system.frame(system.shape(z.hi, z.lo)), z.next / h
         off = v - system.forward(c, system.back(c, system.weights * v))

@@ -21,7 +21,7 @@ METHODS: dict[str, type[Integrator]] = {cls.name: cls for cls in (*_OWN, *_SCIPY
 
 def find(method: str | Integrator) -> Integrator:
     """The integrator of a name, with its default settings; an integrator is returned as it is."""
-    if isinstance(method, Integrator):
+    if not isinstance(method, str) and isinstance(method, Integrator):
         return method
     return _standard(checks.choice("method", method, METHODS))
 

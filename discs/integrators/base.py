@@ -3,6 +3,7 @@
 import signal
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
@@ -35,13 +36,21 @@ class Work:
 
 
 class Tally(NamedTuple):
-    """What a compiled run of steps reports: steps taken, its work, and a disc that lost its heading or -1."""
+    """What a compiled run of steps reports: steps taken, its work, and a disc that lost its heading or -1; how many looks were
+    passed, and whether it stopped before one that is doubted; whether the kinetic energy is not below the bound."""
 
     steps: int
     gradients: int
     solves: int
     unconverged: int
     lost: int
+    passed: int
+    doubted: bool
+    blown: bool
+
+
+Looks = tuple[int, NDArray, NDArray, NDArray, float]  # what `discs.kernels.driver` is told of them
+NO_LOOKS: Looks = 0, np.empty(0, np.int64), np.empty((1, 1, 0)), np.empty((1, 2, 1)), np.inf
 
 
 class Cut(Exception):
@@ -85,6 +94,12 @@ class Integrator(ABC):
     offers: ClassVar[tuple[str, ...]] = ()
     takes_loads: ClassVar[bool] = True
     adaptive: ClassVar[bool]
+
+    @final
+    @cached_property
+    def settings(self) -> str:
+        """What `stats` tells of it."""
+        return repr(self)
 
     @property
     @abstractmethod
@@ -160,7 +175,9 @@ class FixedStep(Integrator):
         return self.parameters is not None
 
     @final
-    def march(self, chain: Any, memory: Any, t: float, h: float, steps: int, bound: float) -> tuple[Any, Tally]:
+    def march(
+        self, chain: Any, memory: Any, t: float, h: float, steps: int, bound: float, looks: Looks = NO_LOOKS
+    ) -> tuple[Any, Tally]:
         """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.kernel`.
 
         Stops after a step whose kinetic energy is not below `bound`, and after one in which a disc loses its heading; the returned
@@ -169,7 +186,7 @@ class FixedStep(Integrator):
         import discs.kernels.driver as driver
 
         state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta of roll alone are one row there
-        tally = Tally(*driver.march(self.parameters, chain, state, t, h, steps, bound))
+        tally = Tally(*driver.march(self.parameters, chain, state, t, h, steps, bound, *looks))
         if tally.steps < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut
@@ -203,7 +220,7 @@ class OneStep(FixedStep):
             z, tally = self.march(chain, memory, t, tau, 1, np.inf)
             work.add(tally)
             lost = tally.lost
-        rate, q = np.empty_like(z.hi), np.empty_like(z.hi)
+        rate, q = np.empty(z.hi.shape), np.empty(z.hi.shape)
         energy, slip = driver.look(chain, z if z.pi.ndim == 2 else Phase(z.hi, z.lo, z.pi[None]), rate, q)
         return Frame(z.hi, z.lo, rate, lost, (q, energy, slip))
 

@@ -141,7 +141,7 @@ def _room(method: Collocation, chain: Any, state: Phase) -> Room:
     )
 
 
-@fill(do.step, Collocation)
+@fill(do.step, Collocation, forceinline=True)
 def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     c, move, p, force, rest, x, z, stages, v = (
         room.c,
@@ -211,6 +211,7 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
             for i in range(s):
                 total += rule.last[i] * (p[i, row, k] - start)
             after.pi[row, k] = start + total
+    do.settle(chain, work, after.hi, after.lo)
     return s * sweep, sweep * (rule.real.size + rule.pairs.size), method.tolerance > 0 and sweep == method.sweeps
 
 

@@ -116,15 +116,12 @@ def _room(method: Composed, chain: Any, state: Phase) -> Room:
     return Room(np.empty_like(state.pi), np.empty_like(state.hi), np.zeros_like(state.hi), np.empty(state.hi.shape[1]))
 
 
-@fill(do.step, Composed)
+@fill(do.step, Composed, forceinline=True)
 def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     p, move, now, time = room.p, room.move, before, t
     solves, unconverged = 0, 0
     for part in range(method.fractions.size):
         tau = method.fractions[part] * h
-        if part:
-            now = after
-            do.settle(chain, work, now.hi, now.lo)
         do.frame(chain, work, room.still, work.c)
         copy(now.pi, p)
         renew(work.c, p, 0.5 * tau, move, chain.scale, room.change)
@@ -142,6 +139,8 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
             mean, start, end = p[row], now.pi[row], after.pi[row]
             for i in range(mean.size):
                 end[i] = 2 * mean[i] - start[i]
+        now = after
+        do.settle(chain, work, now.hi, now.lo)
     return solves, solves, unconverged
 
 

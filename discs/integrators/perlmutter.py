@@ -120,7 +120,7 @@ def _room(method: Swept, chain: Any, state: Phase) -> Room:
     )
 
 
-@fill(do.step, Swept)
+@fill(do.step, Swept, forceinline=True)
 def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     c, end, still, half, move, v, g, pull, share, ones, change = room
     do.frame(chain, work, still, c)
@@ -163,6 +163,7 @@ def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after
                 whole[k] = new
             moved = max(moved, largest(change) / chain.scale[row])
     advance(before, move, 1.0, after)
+    do.settle(chain, work, after.hi, after.lo)
     return 1, 0, method.tolerance > 0 and sweep == method.sweeps
 
 

@@ -72,7 +72,7 @@ def _room(method: Explicit, chain: Any, state: Phase) -> Room:
     return Room(c, move, v, total, np.empty_like(state.pi), np.empty_like(state.pi), np.empty_like(state.pi))
 
 
-@fill(do.step, Explicit)
+@fill(do.step, Explicit, forceinline=True)
 def _step(method: Explicit, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     c, move, v, total, g, kick, p = room
     nodes, weights, pi = method.nodes, method.weights, before.pi
@@ -96,6 +96,7 @@ def _step(method: Explicit, chain: Any, work: Any, room: Room, before: Phase, af
     for row in range(g.shape[0]):
         for k in range(g.shape[1]):
             after.pi[row, k] = pi[row, k] - h / 6 * kick[row, k]
+    do.settle(chain, work, after.hi, after.lo)
     return 4, 0, 0
 
 

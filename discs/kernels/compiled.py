@@ -5,20 +5,25 @@ Parts are plain Python functions; numba is told of them, and imported, when the 
 plain Python, for a debugger and to see which lines are reached.
 
 Compiled kernels are cached on disc, so compiling is paid once per machine. numba knows a cached kernel by the file it stands in,
-not by those it calls. So each pair of a method and a chain has its kernel cached in a folder named by the content of all files that
-it may call: in NUMBA_CACHE_DIR if it is set, otherwise in `__pycache__` beside the kernels, otherwise in the user's cache. Where
-none can be written every process compiles, and warns of it.
+not by those it calls. So each pair of a method and a chain has its kernel cached in a folder named by the content of the files that
+it may call: those with its forms, and with what these import of parts and forms. It is in NUMBA_CACHE_DIR if that is set, otherwise
+in `__pycache__` beside the kernels, otherwise in the user's cache. Where none can be written every process compiles, and warns of
+it. A folder of earlier content goes when a new one is made, if nothing has used it for a day: another process may.
 """
 
 import hashlib
 import inspect
+import os
+import shutil
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache, partial, singledispatch, wraps
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from discs.warn import warn
@@ -28,12 +33,15 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # from Python.
 PART: dict[str, Any] = OPTIONS | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 HERE = Path(__file__).parent
+CALLED = HERE / "compiled.py", HERE / "limits.py"  # files that every kernel may call
 ROOM = 2**20  # bytes that a kernel may take on disc
+UNUSED = 86_400.0  # seconds after which kernels of earlier content are removed
 CUT = -1, 0, 0  # in place of a step's cost, where Ctrl-C was pressed
 Cost = tuple[int, int, int]  # of a step: gradients, solves, iterations that ended on their limit
 
 _WAITING: list[Callable[[], object]] = []  # what numba is to be told of
-_FILES: dict[type, set[Path]] = {}  # where the forms for a chain or a method stand
+_MODULES: dict[str, dict[str, Any]] = {}  # those with parts, forms or kernels, and what they hold
+_FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
 
 
 def _tell(what: Callable[[], object]) -> None:
@@ -53,6 +61,7 @@ def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """A function that kernels call, and that makes no arrays."""
     if function is None:
         return partial(part, **options)
+    _MODULES[function.__module__] = function.__globals__
 
     def tell() -> None:
         from numba.extending import register_jitable
@@ -70,6 +79,7 @@ def stub(function: Callable[..., Any]) -> Any:
     def missing(first: Any, *rest: Any) -> Any:
         raise NotImplementedError(f"{type(first).__name__} has no {function.__name__}")
 
+    _MODULES[function.__module__] = function.__globals__
     return singledispatch(missing)
 
 
@@ -77,7 +87,8 @@ def fill(of: Any, kind: type, **options: Any) -> Callable[[Callable[..., Any]], 
     """Give a stub its form for one kind of parameters, a NamedTuple."""
 
     def register(function: Callable[..., Any]) -> Callable[..., Any]:
-        _FILES.setdefault(kind, set()).add(Path(inspect.getfile(function)))
+        _MODULES[function.__module__] = function.__globals__
+        _FORMS.setdefault(kind, set()).add(function.__module__)
 
         def tell() -> None:
             from numba.extending import overload
@@ -116,7 +127,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
             if isinstance(argument, tuple):
                 kinds += tuple(map(type, argument))
         if kinds not in known:
-            known[kinds] = compiled(function, *(kind for kind in kinds if kind in _FILES))
+            known[kinds] = compiled(function, *(kind for kind in kinds if kind in _FORMS))
         return known[kinds](*arguments)
 
     return call
@@ -127,8 +138,10 @@ def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
     import numba
 
     tell_numba()
-    files = sorted({path for kind in kinds for path in _FILES[kind]} | {Path(inspect.getfile(function))})
-    kept = _cache(tuple(files))
+    files = _files(function, *kinds)
+    if not all(path.is_file() for path in files):  # what is typed into a notebook is not kept
+        return jit(function)
+    kept = _cache(files, "-".join([function.__name__, *(kind.__name__ for kind in kinds)]))
     if not kept:
         _warn_of_no_cache()
         return jit(function)
@@ -139,32 +152,57 @@ def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
         numba.config.CACHE_DIR = own
 
 
+def _files(function: Callable[..., Any], *kinds: type) -> tuple[Path, ...]:
+    """The files that a kernel may call with these kinds of parameters."""
+    _MODULES[function.__module__] = function.__globals__
+    found: set[str] = set()
+    waiting = {function.__module__}.union(*(_FORMS[kind] for kind in kinds))
+    while waiting:
+        found |= waiting
+        held = [value for name in waiting for value in _MODULES[name].values()]
+        names = {value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", "") for value in held}
+        waiting = (names & _MODULES.keys()) - found
+    return tuple(sorted(Path(_MODULES[name].get("__file__", name)) for name in found))
+
+
 def _content(files: tuple[Path, ...]) -> str:
-    """What tells kernels that call what stands in these files from all others; in a package they may call all beside it."""
-    folders = {HERE} | {path.parent for path in files if (path.parent / "__init__.py").exists()}
-    sources = sorted({*files, *(source for folder in folders for source in folder.glob("*.py"))})
+    """What tells kernels that call what stands in these files from all others; in a package not ours, all beside them too."""
+    folders = {path.parent for path in files if HERE.parent not in path.parents and (path.parent / "__init__.py").exists()}
+    sources = sorted({*files, *CALLED, *(source for folder in folders for source in folder.glob("*.py"))})
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
 
 
 @cache
-def _cache(files: tuple[Path, ...]) -> str:
-    """Where kernels that call what stands in these files are kept; "" if nothing can be written anywhere."""
+def _cache(files: tuple[Path, ...], name: str = "") -> str:
+    """Where kernels of a name that call what stands in these files are kept; "" if nothing can be written anywhere."""
     import numba
     from numba.misc.appdirs import user_cache_dir
 
     users = user_cache_dir("rolling-discs")  # relative if XDG_CACHE_HOME is empty, which stands for unset
     bases = numba.config.CACHE_DIR, HERE / "__pycache__", users if Path(users).is_absolute() else ""
     for base in filter(None, bases):
-        kept = Path(base) / f"kernels-{_content(files)}"
+        kept = Path(base) / f"kernels-{name}-{_content(files)}"
         try:
             kept.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=kept) as file:
                 file.write(bytes(ROOM))
                 file.flush()
-                return str(kept)
+            os.utime(kept)
         except OSError:
             continue
+        _remove_earlier(kept)
+        return str(kept)
     return ""
+
+
+def _remove_earlier(kept: Path) -> None:
+    """Remove kernels of the same name and earlier content that no process has used for a day."""
+    for other in kept.parent.glob("kernels-*"):
+        name = other.name.rpartition("-")[0]
+        if other != kept and name in ("kernels", kept.name.rpartition("-")[0]):  # once they were named by their content alone
+            with suppress(OSError):
+                if time.time() - other.stat().st_mtime > UNUSED:
+                    shutil.rmtree(other)
 
 
 uncached: list[bool] = []  # whether kernels could not be kept

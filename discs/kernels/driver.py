@@ -9,47 +9,102 @@ import numpy as np
 
 from discs.kernels import protocol as do
 from discs.kernels.compiled import interrupted, kernel, part
+from discs.kernels.limits import TURNED
 from discs.kernels.shared import ahead, forward
 from discs.skew import Phase
 
+POLLED = 16  # of so many steps one begins with a look for Ctrl-C; sweeps look for themselves
+
 
 @kernel
-def march(method, chain, state, t, h, steps, bound):
-    """`steps` steps from a state at the time t, in place.
+def march(method, chain, state, t, h, steps, bound, first, looks, places, defects, limit):
+    """`steps` steps from a state at the time t, in place; `first` were taken before.
 
-    Returns (taken, gradients, solves, unconverged, lost). It stops after a step whose kinetic energy is not below `bound`, and
-    after one in which disc `lost` >= 0 loses its heading: on the straight way that it went or, if the step did not converge or is
-    explicit, on the way that its velocity pointed. The state is then undefined, as it is where `taken` is -1: Ctrl-C was pressed.
+    Returns (taken, gradients, solves, unconverged, lost, passed, doubted, blown). It stops after a step that has `blown`, as its
+    kinetic energy is not below `bound`, and after one in which disc `lost` >= 0 loses its heading: on the straight way that it went
+    or, if the step did not converge or is explicit, on the way that its velocity pointed. The state is then undefined, as it is
+    where `taken` is -1: Ctrl-C was pressed.
+
+    The last of `looks` (m,) steps in all is looked at, see `discs.running.step_error`: `defects` (m, 2, rows) and `places` are
+    filled, `passed` counts. It stops before a step that is `doubted`, as its defect is beyond `limit`.
     """
     work, room = do.workspace(chain), do.room(method, chain, state)
     before, after = state, do.like(state)
     rows, n = before.hi.shape
-    half, c, slope = np.empty((rows, n)), np.empty((rows, n)), np.zeros((2, n))
-    gradients, solves, unconverged, lost = 0, 0, 0, -1
+    few, vanishing = looks.size > 0 and looks[0] < 3, do.vanishing(chain)
+    half, c, slope = np.empty((rows, n * vanishing)), np.empty((rows, n * (few or vanishing))), np.zeros((2, n))
+    g = np.empty((rows - 2, n * few))
+    gradients, solves, unconverged, lost, passed, doubted, blown = 0, 0, 0, -1, 0, False, False
+    due = looks[0] - first if looks.size else -1  # steps of this call
     do.settle(chain, work, before.hi, before.lo)
     do.lost(chain, work, slope)
     for step in range(steps):
-        if interrupted():
-            return -1, gradients, solves, unconverged, -1
+        if step % POLLED == 0 and interrupted():
+            return -1, gradients, solves, unconverged, -1, passed, doubted, False
+        if do.vanishing(chain) and do.jumps(method):
+            lost = ahead(chain, work, before, h, c, half, slope)
+            if lost >= 0:
+                return step + 1, gradients, solves, unconverged, lost, passed, doubted, False
+        if step >= due - 3 and step < due:
+            place = places[passed % places.shape[0]]
+            if step == due - 3:
+                place[:] = 0.0
+            add_up(before.hi, -1.0 if step == due - 3 else 3.0 if step == due - 2 else -3.0, place)
         new = do.step(method, chain, work, room, before, after, t + step * h, h)
         if new[0] < 0:
-            return -1, gradients, solves, unconverged, -1
+            return -1, gradients, solves, unconverged, -1, passed, doubted, False
+        if step + 1 == due:
+            place = places[passed % places.shape[0]]
+            add_up(after.hi, 1.0, place)
+            if few:
+                do.kick(before, after, chain, work, t + step * h, h, c, g, place)
+            if judge(before.hi, after.hi, place, defects[passed]) > limit:
+                steps, doubted = step, True
+                break
+            passed += 1
+            due = looks[passed] - first if passed < looks.size else -1
         gradients, solves, unconverged = gradients + new[0], solves + new[1], unconverged + new[2]
-        if do.vanishing(chain) and (new[2] > 0 or do.jumps(method)):
+        if do.vanishing(chain) and new[2] > 0 and not do.jumps(method):
             do.settle(chain, work, before.hi, before.lo)
-            do.rate(before, chain, work, c, 0.5 * h, half)
-            lost = ahead(chain, work, before, half, slope)
+            lost = ahead(chain, work, before, h, c, half, slope)
             if lost >= 0:
-                return step + 1, gradients, solves, unconverged, lost
-        do.settle(chain, work, after.hi, after.lo)
+                return step + 1, gradients, solves, unconverged, lost, passed, doubted, False
+            do.settle(chain, work, after.hi, after.lo)
         lost = do.lost(chain, work, slope)
         before, after = after, before
-        if lost >= 0 or not do.kinetic(before, chain, h) <= bound:
+        blown = not do.kinetic(before, chain, h) <= bound
+        if lost >= 0 or blown:
             steps = step + 1
             break
     if steps % 2:
         do.take(before, state)
-    return steps, gradients, solves, unconverged, lost
+    return steps, gradients, solves, unconverged, lost, passed, doubted, blown
+
+
+@part
+def add_up(q, factor, total):
+    """total += factor q, both (rows, n)."""
+    for row in range(q.shape[0]):
+        x, to = q[row], total[row]
+        for i in range(to.size):
+            to[i] += factor * x[i]
+
+
+@part
+def judge(start, end, place, defect):
+    """The largest defect of a step, relative to positions; infinite where it hides what it is.
+
+    place : third differences, (rows, n), then positions at the `end` of the step. defect : (2, rows), absolute ones, and sizes.
+    """
+    worst = 0.0
+    for row in range(end.shape[0]):
+        off, size, turned, before, after, to = 0.0, 0.0, 0.0, start[row], end[row], place[row]
+        for i in range(to.size):
+            off, size, turned = max(off, abs(to[i])), max(size, abs(after[i])), max(turned, abs(after[i] - before[i]))
+            to[i] = after[i]
+        defect[0, row], defect[1, row] = off / 12, size
+        worst = np.inf if row == 3 and turned > TURNED else max(worst, defect[0, row] / (size if size > 0 else 1.0))
+    return worst
 
 
 @part

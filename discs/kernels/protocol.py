@@ -90,7 +90,8 @@ def room(method, chain, state):
 
 @stub
 def step(method, chain, work, room, before, after, t, h):
-    """A step from `before`, which is the base position and is left as it is, at the time t to `after`; returns its `Cost`."""
+    """A step from `before`, the base position, which is left as it is, at the time t to `after`, then the base position; returns
+    its `Cost`."""
 
 
 @stub
@@ -119,6 +120,13 @@ def kinetic(state, chain, h):
 @stub
 def rate(state, chain, work, c, tau, move):
     """move = tau times the velocities at a state, the base position; c is room for C."""
+
+
+@stub
+def kick(before, after, chain, work, t, h, c, g, defect):
+    """defect = 12 times the error that the change of the force in a step of h from the time t tells of, `discs.running.step_error`.
+
+    `after` is the base position; c and g are room like C and C^T grad V."""
 
 
 # What a chain or a field asks of its law of rolling, `chain.rolling`; `vanishing` too

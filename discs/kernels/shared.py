@@ -113,12 +113,26 @@ def _rate(state, chain, work, c, tau, move):
     forward(c, state.pi, move, tau)
 
 
-@part
-def ahead(chain, work, state, half, slope):
-    """A disc that loses its heading if all go on straight from a state by twice `half`, or -1; `slope` is the state's.
+@fill(do.kick, Phase)
+def _kick(before, after, chain, work, t, h, c, g, defect):
+    do.settle(chain, work, before.hi, before.lo)
+    defect[:] = 0.0
+    do.frame(chain, work, defect, c)
+    do.pullback(chain, work, before, t, defect, c, before.pi, g)
+    for row in range(c.shape[0]):
+        a, pull, start, end, to = c[row], g[row // 3], before.pi[row // 3], after.pi[row // 3], defect[row]
+        for i in range(to.size):
+            to[i] = 2 * h * a[i] * (h * pull[i] + (end[i] - start[i]))
+    do.settle(chain, work, after.hi, after.lo)
 
-    `half` is overwritten.
+
+@part
+def ahead(chain, work, state, h, c, half, slope):
+    """A disc that loses its heading if all go on straight from a state, the base position, for a time h, or -1.
+
+    `slope` is the state's; c and half are room like positions.
     """
+    do.rate(state, chain, work, c, 0.5 * h, half)
     for row in range(half.shape[0]):
         for i in range(half.shape[1]):
             half[row, i] = state.hi[row, i] + 2 * half[row, i]

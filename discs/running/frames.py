@@ -26,7 +26,7 @@ def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
 
     A time outside the duration by no more than rounding, as `np.arange(0, 0.35, 0.1)` makes of 0.3, is taken at its end.
     """
-    if not isinstance(frames, (list, tuple)) and np.ndim(frames) == 0:
+    if type(frames) is int or (not isinstance(frames, (list, tuple)) and np.ndim(frames) == 0):
         count = checks.whole("frames", frames, 1, "the last state is always one")
         return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])
     need = f"increasing times within [0, {duration:g}], or their number"

@@ -1,11 +1,18 @@
 r"""How far a run of fixed steps may be trusted: the error of its steps, and steps that did not converge.
 
-A step of size h and two of h/2 from the same state differ by the error of the step, up to a factor 1 - 2^-p near one. On a few of
-the run's N steps, spread over it, the step that was taken is compared so; the trajectory is not touched. Errors of smooth motions
-add up: N times the mean difference, relative to the largest value of each of x, y, theta (and phi), doubled, is the estimate
-`step_error`. It is near the error of smooth motions, up to ten times too large where the errors of waves do not add up, and too
-small where the motion amplifies differences. A run of few steps and discs that is so suspected is taken again with half the step,
-and the change (4/3 of it, the error if that goes like h^2) takes the place of the estimate.
+One to eight of a run's N steps, spread over it, are looked at; the trajectory is not touched. A look forms the defect of the step,
+|q_{n+1} - 3 q_n + 3 q_{n-1} - q_{n-2}|/12, from positions that are there anyway; it is near h^3 |q'''|/12. A midpoint step errs by
+(h w)^3/12 of an oscillation of rate w, so the defect is the error of a step of order 2. For steps of higher order it is a bound, as
+long as they resolve the motion; of what they do not resolve, the defect is as large as that itself. Errors of smooth motions add
+up: N times the mean defect, relative to the largest value of each of x, y, theta (and phi), doubled, is the estimate `step_error`.
+Runs of one or two steps have no third difference. There h^2 C (f_m - f_0)/6 stands for it, by the change of the force C^T grad V
+from the start to the middle of the step: f_m = (pi_1 - pi_0)/h.
+
+Where a look alone would make the estimate larger than 1 %, or a heading turns by more than a radian in the step, which may hide
+whole turns, the step is taken again as two of h/2, and the difference, the error of the step up to a factor 1 - 2^-p near one,
+takes the place of the defect. The estimate is then near the error of smooth motions, up to ten times too large where the errors of
+waves do not add up, and too small where the motion amplifies differences. A run of few steps and discs that is suspected even then
+is taken again with half the step, and the change (4/3 of it, the error if that goes like h^2) takes the place of the estimate.
 """
 
 from typing import Any
@@ -14,14 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.chains.rolling_discs import RollingDiscs
-from discs.integrators.base import FixedStep, Tally, Work
+from discs.integrators.base import FixedStep, Looks, Tally, Work
+from discs.kernels.limits import TURNED
 from discs.running.stats import Stats
 from discs.skew import Phase
 
-EVERY = 50  # steps, of which one is compared
-MOST = 8  # steps compared in a run
+EVERY = 50  # steps, of which one is looked at
+MOST = 8  # steps looked at in a run
+FEW = 3  # steps, and there is a third difference
 SAFETY = 2.0
-SUSPECTED = 0.02, 1.0  # of the largest position or angle: between these a run is taken again ...
+DOUBTFUL = 0.01  # of the largest position or angle: an estimate below it needs no comparison
+SUSPECTED = 0.02, 1.0  # of the same: between these a run is taken again ...
 SHORT = 200_000  # ... if it has at most so many steps times discs: some hundredths of a second
 WARNED = 0.05  # of the largest position or angle: a run is warned of
 AIM = 1e-3  # relative error that a warning suggests a step for
@@ -33,56 +43,89 @@ class Watch:
 
     Parameters
     ----------
-    steps : how many the run takes.
+    steps : how many the run takes. rows, n : shape of its positions.
 
     Attributes
     ----------
-    due : the next step to compare, counted from 0.
-    total : (rows,), sum of the largest differences over the discs. size : (rows,), largest positions and angles seen.
-    count : steps compared.
-    short : whether the run may be taken again. places : positions (rows, n) after each step compared, of a short run.
+    looks : (m,), the steps looked at, counted from 1. passed : how many of them were.
+    doubted : whether the step to come is looked at and is to be compared.
+    limit : the largest defect, relative to positions and angles, that needs no comparison.
+    short : whether the run may be taken again.
+    places : positions (rows, n) after each look of a short run; else room for one.
+    defects : (m, 2, rows), of each look the largest defect, or difference, over the discs, and the largest positions and angles.
     """
 
-    def __init__(self, steps: int, n: int) -> None:
-        self.short = 0 < steps * n <= SHORT
-        self.places: list[NDArray] = []
-        self.steps, self.apart = steps, steps / (MOST if steps > MOST * EVERY else 1 + steps // EVERY)
-        self.total: Any = 0.0
-        self.size: Any = 0.0
-        self.count, self.due = 0, int(0.5 * self.apart)
+    def __init__(self, steps: int, rows: int, n: int) -> None:
+        count = MOST if steps > MOST * EVERY else 1 + steps // EVERY
+        looks = [max(FEW, int((i + 0.5) * steps / count) + 1) for i in range(count)] if steps >= FEW else [1]
+        self.looks = np.array(looks, dtype=np.int64)
+        self.steps, self.passed, self.doubted = steps, 0, False
+        self.limit = DOUBTFUL / (SAFETY * (steps or 1))
+        self.short = steps * n <= SHORT
+        self.places = np.empty((count if self.short else 1, rows, n))
+        self.defects = np.empty((count, 2, rows))
+
+    def given(self, first: int) -> Looks:
+        """What compiled steps are told, after `first` of them."""
+        k = self.passed
+        return first, self.looks[k:], self.places[k if self.short else 0 :], self.defects[k:], self.limit
+
+    def look(self, step: int, before: NDArray, after: NDArray) -> bool:
+        """The plain form of a look: positions before and after a step, the last of `step`; whether it is to be compared."""
+        if self.passed == self.looks.size or not 0 <= (ahead := int(self.looks[self.passed]) - step) < FEW:
+            return False
+        if self.steps < FEW:
+            return ahead == 0
+        place = self.places[self.passed if self.short else 0]
+        if ahead == 2:
+            place[:] = 0.0
+        place += (-3.0, 3.0, -1.0)[ahead] * before
+        if ahead:
+            return False
+        defect = np.abs(place + after).max(axis=1) / 12
+        size, turned = np.abs(after).max(axis=1), np.abs(after - before).max(axis=1)
+        if (defect > self.limit * np.where(size > 0, size, 1.0)).any() or (turned[3:] > TURNED).any():
+            return True
+        self._take(defect, size, after)
+        return False
 
     def compare(self, one: NDArray, two: NDArray) -> None:
-        """Count in a step: positions (rows, n) by one step and by two halves."""
-        size, off = np.maximum.reduce(np.abs(two), 1), np.maximum.reduce(np.abs(one - two), 1)
-        self.size, self.total = (np.maximum(self.size, size), self.total + off) if self.count else (size, off)
-        if self.short:
-            self.places.append(one)
-        self.count += 1
-        self.due = int((self.count + 0.5) * self.apart)
+        """Take positions (rows, n) by one step and by two halves in place of a look."""
+        self._take(np.abs(one - two).max(axis=1), np.abs(two).max(axis=1), one)
+
+    def _take(self, off: NDArray, size: NDArray, place: NDArray) -> None:
+        self.defects[self.passed] = off, size
+        self.places[self.passed if self.short else 0] = place
+        self.passed, self.doubted = self.passed + 1, False
+
+    def put_off(self, step: int) -> None:
+        """Begin a look anew that is interrupted after a step."""
+        if self.passed < self.looks.size and self.looks[self.passed] - step < FEW:
+            self.looks[self.passed], self.doubted = step + min(FEW, self.steps), False
+
+    def estimate(self) -> float:
+        """The estimate from what was seen so far."""
+        if not self.passed:
+            return 0.0
+        seen = self.defects[: self.passed]
+        size = np.maximum.reduce(seen[:, 1])
+        size[size == 0] = 1.0
+        return float(np.maximum.reduce(np.add.reduce(seen[:, 0]) / size)) * SAFETY * (self.steps or 1) / self.passed
 
     def again(
         self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: NDArray, h: float, kernel: Any
     ) -> float | None:
         """The error by a run with half the step, at the places kept and at the `last` one; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), kernel)
-        steps = [int((i + 0.5) * self.apart) + 1 for i in range(len(self.places))]
-        for step, place in zip([*steps, self.steps], [*self.places, last], strict=True):
+        size = self.defects[: self.passed, 1].max(axis=0)
+        steps = [*self.looks.tolist(), self.steps] if self.steps else []
+        for step, place in zip(steps, [*self.places, last], strict=True):
             memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), kernel)
             if tally.lost >= 0 or not np.isfinite(memory.hi).all():
                 return None
             done, off = step, np.abs(memory.hi - place).max(axis=1)
-            worst = max(worst, float((off / np.where(self.size > 0, self.size, 1.0)).max()))
+            worst = max(worst, float((off / np.where(size > 0, size, 1.0)).max()))
         return 4 / 3 * worst
-
-    def estimate(self) -> float:
-        """The estimate from the steps compared."""
-        if not self.count:
-            return 0.0
-        worst = 0.0
-        for off, size in zip(self.total, self.size, strict=True):
-            if off > worst * (size or 1.0):
-                worst = off / (size or 1.0)
-        return float(SAFETY * (self.steps or 1) / self.count * worst)
 
 
 def advanced(
@@ -94,7 +137,7 @@ def advanced(
     work = Work()
     for _ in range(steps):
         memory, t = integrator.advance(system, memory, t, h, work), t + h
-    return memory, Tally(steps, work.gradients, work.solves, work.unconverged, -1)
+    return memory, Tally(steps, work.gradients, work.solves, work.unconverged, -1, 0, False, False)
 
 
 def converging(system: RollingDiscs, integrator: FixedStep, before: Any, t: float, steps: int, h: float, kernel: Any) -> float:

@@ -1,14 +1,13 @@
 """Steps without end: what carries a run from frame to frame, plain or compiled, and stops it when it has gone wrong."""
 
 import sys
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import FixedStep, Integrator, Work
-from discs.integrators.base import Cut, Frame
+from discs.integrators.base import NO_LOOKS, Cut, Frame
 from discs.problem import Problem
 from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
@@ -16,7 +15,7 @@ from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which it is said, if kernels are not read from the cache
 _PREPARED: set[tuple[type, ...]] = set()
-WATCHED = ("total", "size", "count", "due")  # of a watch, what a run goes on from
+WATCHED = ("looks", "passed", "doubted", "defects", "places")  # of a watch, what a run goes on from
 CHUNK = 4_000_000  # discs times steps of a compiled call, then progress is shown; Ctrl-C is heard in every sweep
 
 
@@ -111,8 +110,6 @@ class March:
         """All that the run goes on from, as arrays and numbers by name."""
         work = {f"work.{name}": value for name, value in vars(self.work).items()}
         seen = {f"watch.{name}": getattr(self.watch, name) for name in WATCHED} if self.watch else {}
-        if self.watch and self.watch.places:
-            seen["watch.places"] = np.array(self.watch.places)
         return {"step": self.step} | work | seen | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
 
     def recall(self, kept: dict[str, Any]) -> None:
@@ -124,35 +121,28 @@ class March:
             for name in WATCHED:
                 value = kept[f"watch.{name}"]
                 setattr(self.watch, name, value if value.ndim else value.item())
-            if "watch.places" in kept:
-                self.watch.places = list(kept["watch.places"])
         of_memory = {name.removeprefix("memory."): value for name, value in kept.items() if name.startswith("memory.")}
         self.memory = self.integrator.recall(self.memory, of_memory)
 
-    def to(self, step: int) -> Iterator[int]:
-        """Go on to a step; yields how many steps were taken at a time, none where Ctrl-C was heard and did not raise."""
-        watch = self.watch
-        while self.step < step:
-            before, cost = self.memory, vars(self.work).copy()
-            most = min(self.chunk, step - self.step)
-            if watch is not None and watch.due < self.step + most:
-                most = watch.due - self.step or 1
-            finer = None
-            try:
-                taken = self._plain() if self.twin is None else self._compiled(self.twin, most)
-                if due := watch is not None and watch.due == self.step:
-                    finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.kernel)
-            except Cut:  # all of this turn is dropped
-                self.memory = before
-                vars(self.work).update(cost)
-                yield 0
-                continue
-            if self.work.unconverged > cost["unconverged"]:
-                self._remember(before, taken, cost["unconverged"])
-            if watch is not None and due:
-                watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
-            self.step += taken
-            yield taken
+    def on(self, step: int) -> None:
+        """Go on towards a step, not beyond it; no way at all where Ctrl-C was heard and did not raise."""
+        before, cost = self.memory, vars(self.work).copy()
+        try:
+            taken = self._plain() if self.twin is None else self._compiled(self.twin, min(self.chunk, step - self.step))
+        except Cut:  # all of this turn is dropped
+            self.memory = before
+            vars(self.work).update(cost)
+            if self.watch is not None:
+                self.watch.put_off(self.step)
+            return
+        if self.work.unconverged > cost["unconverged"]:
+            self._remember(before, taken, cost["unconverged"])
+        self.step += taken
+
+    def _compare(self, watch: Watch, before: Any) -> None:
+        """Compare the step just taken with one of less error."""
+        finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.kernel)
+        watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
 
     def step_error(self, rest: float) -> float:
         """The estimate of the watch, at the end of a run that ends a time `rest` after its last step."""
@@ -160,13 +150,13 @@ class March:
         if watch is None:
             return 0.0
         if rest and not watch.steps:
-            finer = integrator.finer(self.system, self.memory, self.step * self.h, rest, self.kernel)
-            one = integrator.at(self.system, self.memory, self.step * self.h, rest, self.h, Work(), self.kernel)
+            memory = integrator.begin(self.system, self.problem.start(), rest, Work(), self.kernel)
+            finer = integrator.finer(self.system, memory, 0.0, rest, self.kernel)
+            one = integrator.at(self.system, memory, 0.0, rest, rest, Work(), self.kernel)
             watch.compare(one.hi, one.hi if finer is None else finer)
         found = watch.estimate()
         if watch.short and SUSPECTED[0] < found < SUSPECTED[1] and not self.stuck and isinstance(integrator, FixedStep):
-            start = self.problem.start()
-            again = watch.again(self.system, start, integrator, self.memory.hi, self.h, self.kernel)
+            again = watch.again(self.system, self.problem.start(), integrator, self.memory.hi, self.h, self.kernel)
             return found if again is None else again
         return found
 
@@ -227,6 +217,8 @@ class March:
         # leapfrog remembers more than a state; its moves are its velocity
         by_velocity = self.work.unconverged > stuck or (self.explicit and isinstance(previous, Phase))
         self._check(self._lost(previous, self.memory, self.h, by_velocity), self.step + 1, previous)
+        if self.watch is not None and self.watch.look(self.step + 1, previous.hi, self.memory.hi):
+            self._compare(self.watch, previous)
         return 1
 
     def _lost(self, before: Any, after: Placed, h: float, by_velocity: bool) -> int | None:
@@ -245,12 +237,20 @@ class March:
         return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)
 
     def _compiled(self, twin: FixedStep, steps: int) -> int:
-        previous = self.memory
-        self.memory, tally = twin.march(self.kernel, previous, self.step * self.h, self.h, steps, self.bound)
+        previous, watch, looks = self.memory, self.watch, NO_LOOKS
+        if watch is not None:
+            steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
+        self.memory, tally = twin.march(self.kernel, previous, self.step * self.h, self.h, steps, self.bound, looks)
         self.work.add(tally)
         if tally.lost >= 0:
             previous, _ = twin.march(self.kernel, previous, self.step * self.h, self.h, tally.steps - 1, self.bound)
-        self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
+        if tally.lost >= 0 or tally.blown:
+            self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
+        if watch is not None:
+            if watch.doubted:
+                self._compare(watch, previous)
+            else:
+                watch.passed, watch.doubted = watch.passed + tally.passed, tally.doubted
         return tally.steps
 
     def _check(self, lost: int | None, step: int, before: Any) -> None:

@@ -1,12 +1,9 @@
 """The compiled forms against their plain twins, and the linear algebra in them against NumPy."""
 
 import math
-import os
-import shutil
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -207,66 +204,10 @@ def test_compiling_is_announced_once(method, progress, monkeypatch, capsys):
     assert said == (progress and isinstance(method, Compiling))
 
 
-TINY = """
-from discs.kernels.compiled import kernel
-
-@kernel
-def twice(x):
-    return 2 * x
-
-@kernel
-def thrice(x):
-    return 3 * x
-"""
-NO_CACHE = """
-import warnings
-with warnings.catch_warnings(record=True) as told:
-    warnings.simplefilter("always")
-    from discs.kernels import tiny
-    tiny.twice(1)  # line 6
-print([(w.filename, w.lineno, str(w.message)[:31]) for w in told], tiny.twice(21), tiny.thrice(14))
-"""
-
-
-@pytest.mark.parametrize("folder", ["", "cache", "nowhere/cache"])
-def test_without_a_folder_for_the_cache(folder, tmp_path):
-    """A read-only package and no home: __pycache__ is a file, which stops root too."""
-    shutil.copytree(Path(compiled.__file__).parents[1], tmp_path / "discs", ignore=shutil.ignore_patterns("__pycache__"))
-    (tmp_path / "discs" / "kernels" / "__pycache__").touch()
-    (tmp_path / "discs" / "kernels" / "tiny.py").write_text(TINY)
-    (tmp_path / "nowhere").touch()
-    outside = {"PYTHONPATH": str(tmp_path), "HOME": "/dev/null", "XDG_CACHE_HOME": "", "PYTHONDONTWRITEBYTECODE": "1"}
-    outside |= {"NUMBA_CACHE_DIR": str(tmp_path / folder)} if folder else {}
-    before = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    (tmp_path / "empty").mkdir()
-    done = subprocess.run(
-        [sys.executable, "-c", NO_CACHE], env=before | outside, cwd=tmp_path / "empty", capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    kept = folder == "cache"
-    told = [] if kept else [("<string>", 6, "compiled kernels cannot be kept")]
-    assert done.stdout.strip() == f"{told} 42 42"
-    assert bool(list(tmp_path.glob("cache/kernels-*/**/*.nbc"))) == kept
-    assert not list((tmp_path / "empty").iterdir())
-
-
 def test_importing_does_not_compile():
     """numba is slow to import: it is taken only when something runs."""
     code = "import sys, discs; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_compiled_kernels_are_kept_by_all_that_they_may_call(tmp_path):
-    kept, rod = compiled._cache.__wrapped__, tmp_path / "rod.py"
-    rod.write_text("one = 1")
-    before = kept((rod,))
-    assert before == kept((rod,)) != kept((Path(compiled.__file__),))
-    rod.write_text("one = 2")
-    assert kept((rod,)) != before
-    (tmp_path / "__init__.py").touch()  # in a package, what stands beside it may be called too
-    before = kept((rod,))
-    (tmp_path / "beside.py").write_text("two = 2")
-    assert kept((rod,)) != before
 
 
 def test_same_input_same_bits():

@@ -7,13 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare import lump
-from compare.hardcases.problems import rough
-from continuum import breathing_ring, rolling_rod, untwisting_rod
+from continuum import breathing_ring, untwisting_rod
 from continuum.mesh import semidiscretise
 from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, simulate, suggest_dt
 from discs.chains.twist import untwisting_chain
-from discs.command_line import summary
 from discs.integrators import METHODS
 from discs.running.frames import steps_before
 from tests.conftest import Model, models, uneven
@@ -46,14 +43,13 @@ def test_asking_for_frames_does_not_change_the_trajectory(name):
 
 
 def test_a_call_does_little_besides_its_steps():
-    """A call with one step and one frame takes 0.12 ms (docs/speed.py). Time is noisy, so functions called are counted: 128 where
-    that was measured, 161 where it was half as long again."""
+    """Time is noisy, so functions called are counted, NumPy's and built in ones among them."""
     problem = untwisting_chain(32, duration=0.01)
     for _ in range(3):  # until what is looked up once has been
         simulate(problem, dt=0.01, frames=1, progress=False)
     profile = cProfile.Profile()
     profile.runcall(simulate, problem, dt=0.01, frames=1, progress=False)
-    assert sum(entry.callcount for entry in profile.getstats()) <= 145
+    assert sum(entry.callcount for entry in profile.getstats()) <= 125
 
 
 def test_frames_between_steps_are_as_accurate_as_steps():
@@ -214,48 +210,6 @@ def test_lost_energy_is_said():
     with pytest.warns(UserWarning, match=r"leapfrog: energy is conserved, but at t = .* the run may not be trusted"):
         simulate(problem, "leapfrog", progress=False)
     simulate(problem, "midpoint", dt=0.1, progress=False)
-
-
-TOO_LONG = [
-    (lump(untwisting_rod(twist=2.0), n=65, ends="consistent"), {"method": "midpoint"}, r"38 of 100 steps did not converge"),
-    (lump(untwisting_rod(), 33), {"dt": 4.5}, r"did not converge; dt = 4.5 is too long for this motion.*altogether.*take dt = "),
-    (lump(rolling_rod(omega=100.0, duration=1.0, amplitude=1e-2), 33), {"dt": 0.05}, "did not converge.*off altogether"),
-    (untwisting_chain(4097, duration=4.0), {"dt": 1.0}, r"did not converge.*off altogether"),
-    (rough(65, 4.5), {"method": "midpoint"}, "dt = 0.045 is too long for this motion.*off altogether"),
-    (lump(untwisting_rod(duration=9.0), 65), {"method": "leapfrog"}, "energy is conserved.*too long for this motion"),
-]
-
-
-@pytest.mark.parametrize(("problem", "settled", "message"), TOO_LONG, ids=["twist", "one", "rolling", "many", "rough", "leapfrog"])
-def test_a_step_that_is_too_long_is_said(problem, settled, message):
-    with pytest.warns(UserWarning, match=message) as heard:
-        run = simulate(problem, **settled, progress=False)
-    assert len(heard) == 1
-    assert heard[0].filename == __file__
-    assert "may not be trusted" in str(heard[0].message)
-    for told in (repr(run), summary(run)):
-        assert "did not converge" in told or "too long" in told
-
-
-def test_a_step_that_converges_is_named():
-    """With the step that `stats` names all steps converge."""
-    problem = lump(untwisting_rod(twist=2.0), n=65, ends="consistent")
-    with pytest.warns(UserWarning, match=r"steps did not converge.*take dt = 0\.00"):
-        run = simulate(problem, "midpoint", progress=False)
-    assert run.stats["converging_dt"] == run.stats["dt"] / 4
-    finer = simulate(problem, "midpoint", run.stats["converging_dt"], progress=False)
-    assert finer.stats["unconverged"] == 0
-
-
-@pytest.mark.parametrize("name", FIXED)
-def test_the_error_of_steps_is_that_of_the_run(name):
-    """Steps long enough for errors to show. (leapfrog's is nine times too large: the errors of its velocities do not add up.)"""
-    problem = uneven(7, Model("springs", "field"))
-    dt = {2: 0.02, 4: 0.1, 6: 0.2, 8: 0.25}[METHODS[name].order] if np.isinf(METHODS[name]().stability_limit) else None
-    run = simulate(problem, name, dt, progress=False)
-    exact = simulate(problem, "gauss8", 0.02, progress=False)
-    error = max(np.abs(getattr(run, q) - getattr(exact, q)).max() / np.abs(getattr(exact, q)).max() for q in ("x", "y", "theta"))
-    assert error / 5 < run.stats["step_error"] < 10 * error
 
 
 def test_whole_steps_are_counted_where_rounding_would_lose_one():
