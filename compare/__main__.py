@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from compare import precision, report
@@ -18,10 +19,10 @@ from compare.trust_table import Trust
 from continuum import Scene, steered_rod, untwisting_rod
 from continuum.files import read_scene
 from discs import command_line
+from discs.chains.rolling import ROLLING
 
 LAWS: dict[str, Callable[[], Scene]] = {
-    "field": untwisting_rod,
-    "unit": lambda: untwisting_rod(rolling="unit"),
+    **{law: partial(untwisting_rod, law) for law in ROLLING},
     "own": lambda: steered_rod(stretch_stiffness=10, shear_stiffness=10, heading_inertia=0.25),
 }
 
@@ -33,7 +34,7 @@ def parser() -> argparse.ArgumentParser:
         description="N rolling discs against the nonholonomic Cosserat rod: table, convergence, motion and energy.",
     )
     p.add_argument("--scene", metavar="FILE.toml", help="scene to compare; default: the paper's untwisting rod")
-    p.add_argument("--rolling", choices=("field", "unit"), help="law of rolling of the default scene (default: field)")
+    p.add_argument("--rolling", choices=tuple(ROLLING), help="law of rolling of the default scene (default: field)")
     p.add_argument(
         "--out",
         metavar="DIR",

@@ -57,16 +57,17 @@ def peers(problem: Problem) -> list[Peer]:
     """
     f = reduced.Bound(problem)
     n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
+    law, curvature = (problem.chain.rolling, problem.chain.curvature) if isinstance(problem.chain, Chain) else ("own", "linear")
     found = reduced.scipy_peers(problem, f)
     if find_spec("sksundae"):
         found += reduced.sundials_peers(problem, f)
     if n <= 128:
         found.append(multipliers.saddle_peer(problem))
-    if problem.system.kernel is None:
+    if problem.system.kernel is None or curvature != "linear":
         return found
     if find_spec("sksundae"):
         found.append(multipliers.multiplier_peer(problem))
-    if find_spec("diffrax") and problem.chain.ends == "springs":
+    if find_spec("diffrax") and problem.chain.ends == "springs" and law in ("field", "unit", "own"):
         from compare.peers.in_jax import diffrax_peers
 
         found += diffrax_peers(problem)
@@ -75,7 +76,7 @@ def peers(problem: Problem) -> list[Peer]:
         from compare.peers.exudyn_field import exudyn_field_peer
 
         found.append(exudyn_field_peer(problem) if slaved else exudyn_steered_peer(problem))
-    if find_spec("mujoco") and n <= 512 and not (isinstance(problem.chain, Chain) and problem.chain.rolling == "field"):
+    if find_spec("mujoco") and n <= 512 and law in ("unit", "own"):
         from compare.peers.mujoco_discs import mujoco_peer
 
         found += [mujoco_peer(problem), mujoco_peer(problem, second_order=False)]

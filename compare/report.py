@@ -32,11 +32,12 @@ from compare.results import Study
 from compare.study import convergence
 from continuum import Scene, solve, untwisting_rod
 from discs import Problem, Solution, checks
+from discs.chains.rolling import ROLLING
 from discs.pictures import geometry
 
 SIZES = (17, 33, 65, 129, 257)
 FRAMES = 97  # of the fields, among them the instants of their pictures
-LAWS = {"field": "the paper's law, ṙ = RωJr'", "unit": "true rolling, ṙ = RωJr'/|r'|"}
+LAWS = {name: law.formula for name, law in ROLLING.items()}
 PACKAGES = ("numpy", "scipy", "matplotlib", "numba", "scikit-sundae", "rolling-discs")
 
 PAGE = """<!DOCTYPE html>

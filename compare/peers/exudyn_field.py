@@ -33,6 +33,7 @@ from compare.peers.peer import Cutoff, Outcome, Peer
 from discs import Chain, Problem
 from discs.arrays import Float
 from discs.chains import stencils
+from discs.chains.rolling import RollingLaw
 
 STEPS = (45.0, 90.0, 180.0, 360.0, 720.0)
 BLOCK = 16  # discs that share a node and a connector: fewer mean more calls of Python, more mean larger dense matrices
@@ -119,7 +120,7 @@ def _build(mbs: Any, problem: Problem) -> float:
     radius = np.broadcast_to(np.asarray(chain.radius, float), n)
     for own, node in zip(blocks, nodes, strict=True):
         near = np.unique(slope[own].nonzero()[1])  # discs whose positions the block's headings depend on
-        rolling: Any = _Rolling(mbs, slope[own][:, near].toarray(), offset[:, own], radius[own], near, chain.rolling == "unit")
+        rolling: Any = _Rolling(mbs, slope[own][:, near].toarray(), offset[:, own], radius[own], near, chain.rolling_law)
         marker = mbs.AddMarker(items.MarkerNodeCoordinates(nodeNumber=node))
         mbs.AddObject(
             items.ObjectConnectorCoordinateVector(
@@ -140,9 +141,9 @@ class _Rolling:
     slope, offset : r' of the block's discs from the positions of the discs `near`, (block, near), and for positions 0, (2, block).
     """
 
-    def __init__(self, mbs: Any, slope: Float, offset: Float, radius: Float, near: Float, unit: bool) -> None:
+    def __init__(self, mbs: Any, slope: Float, offset: Float, radius: Float, near: Float, law: RollingLaw) -> None:
         self._state = mbs.systemData.GetODE2Coordinates  # of the present iterate, which is the current configuration
-        self._slope, self._offset, self._radius, self._unit = slope.T.copy(), offset, radius, unit
+        self._slope, self._offset, self._radius, self._law = slope.T.copy(), offset, radius, law
         self._near = 3 * near + np.arange(2)[:, None]
         size, disc = len(radius), np.arange(len(radius))
         self._rows = np.zeros((2 * size, 3 * size))
@@ -154,8 +155,8 @@ class _Rolling:
     def _contact(self) -> tuple[Float, Float]:
         """e, by components."""
         slope = self._state()[self._near] @ self._slope + self._offset
-        radius = self._radius / np.hypot(slope[0], slope[1]) if self._unit else self._radius
-        return -radius * slope[1], radius * slope[0]
+        arm = self._law.arm(self._radius, slope)
+        return -arm * slope[1], arm * slope[0]
 
     def value(self, mbs: Any, t: float, item: int, q: Float, v: Float, velocity_level: bool) -> Float:
         """A(q) v of the block."""

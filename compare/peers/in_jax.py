@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from compare.peers.peer import TOLERANCES, Cutoff, Outcome, Peer
-from discs import Chain, Problem
+from discs import Chain, Problem, checks
 
 
 def diffrax_peers(problem: Problem) -> list[Peer]:
@@ -70,6 +70,10 @@ def _in_jax(problem: Problem) -> Callable[[Any], Any]:
     chain, system = problem.chain, problem.system
     if chain.ends not in ("springs", "paper"):
         raise ValueError("the JAX form of the equations is written for plain free ends")
+    headings: dict[str, Callable[[Any], Any]] = {"field": lambda z: z, "unit": lambda z: z / jnp.hypot(z[0], z[1])}
+    if isinstance(chain, Chain):  # laws are written in NumPy, which JAX does not trace
+        checks.choice("rolling (diffrax)", chain.rolling, headings)
+        checks.choice("curvature (diffrax)", chain.curvature, ("linear",))
     k, rows = chain.k, len(system.rows)
     weights, radius = jnp.asarray(system.weights), jnp.asarray(chain.radius)
     torsion, bending = jnp.asarray(chain.torsion_stiffness), jnp.asarray(chain.bending_stiffness)
@@ -91,8 +95,7 @@ def _in_jax(problem: Problem) -> Callable[[Any], Any]:
             first = -3 * q[:2, :1] + 4 * q[:2, 1:2] - q[:2, 2:3]
             last = 3 * q[:2, -1:] - 4 * q[:2, -2:-1] + q[:2, -3:-2]
             slope = jnp.concatenate([first, q[:2, 2:] - q[:2, :-2], last], axis=1) / (2 * k)
-            if chain.rolling == "unit":
-                slope = slope / jnp.hypot(slope[0], slope[1])
+            slope = headings[chain.rolling](slope)
             e = radius * jnp.stack([-slope[1], slope[0]])
         else:
             e = radius * jnp.stack([-jnp.sin(q[3]), jnp.cos(q[3])])

@@ -30,6 +30,11 @@ class RollingDiscs(SkewGradient):
     vanishing: bool
     stiffest: float
 
+    @cached_property
+    def rates(self) -> tuple[str, ...]:
+        """Names of the rates of `rows`."""
+        return tuple("omega" if row == "theta" else f"{row}_rate" for row in self.rows)
+
     # Kinematics
 
     @abstractmethod

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted, part
 from discs.kernels.shared import add as advance
-from discs.kernels.shared import copy, forward, largest, renew
+from discs.kernels.shared import column, copy, forward, largest, renew
 from discs.skew import Phase
 
 
@@ -121,7 +121,7 @@ def reach(c: NDArray, p: NDArray, tau: float, scale: NDArray, change: NDArray) -
     """The largest entry of tau C p, each row in units of its `scale`."""
     furthest = 0.0
     for row in range(c.shape[0]):
-        a, q = c[row], p[row // 3]
+        a, q = c[row], p[column(row)]
         for i in range(change.size):
             change[i] = abs(tau * a[i] * q[i])
         furthest = max(furthest, largest(change) / scale[row])

@@ -12,6 +12,7 @@ from discs import checks
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
 from discs.integrators.base import Frame, Integrator, Work
+from discs.kernels.shared import columns
 from discs.skew import Phase
 
 
@@ -27,6 +28,7 @@ class Reduced:
 
     def __init__(self, system: RollingDiscs, chain: Any = None) -> None:
         self.system, self.chain, self.rows, self.n = system, chain, len(system.rows), system.n
+        self.each = self.rows + columns(self.rows)  # unknowns of a disc
 
     def join(self, q: NDArray, pi: NDArray) -> NDArray:
         """y of positions (rows, n) and momenta."""
@@ -54,7 +56,7 @@ class Reduced:
     @property
     def width(self) -> int:
         """Half the bandwidth of the Jacobian of f, of an open chain."""
-        return (self.system.reach + 1) * (2 * self.rows - 2) - 1
+        return (self.system.reach + 1) * self.each - 1
 
     def sparsity(self) -> "scipy.sparse.csc_array":
         """Where the Jacobian of f may differ from zero."""
@@ -63,7 +65,7 @@ class Reduced:
         if self.system.closed:
             offsets += [j + side * n for j in range(-reach, reach + 1) for side in (-1, 1) if 0 < abs(j + side * n) < n]
         near = scipy.sparse.diags_array(np.ones((len(set(offsets)), 1)), offsets=sorted(set(offsets)), shape=(n, n))
-        return scipy.sparse.csc_array(scipy.sparse.kron(near, np.ones((2 * self.rows - 2, 2 * self.rows - 2))))
+        return scipy.sparse.csc_array(scipy.sparse.kron(near, np.ones((self.each, self.each))))
 
 
 @dataclass(frozen=True)

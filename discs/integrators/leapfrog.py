@@ -12,7 +12,7 @@ from discs.integrators.rk4 import RK4
 from discs.kernels import protocol as do
 from discs.kernels.compiled import Cost, fill
 from discs.kernels.shared import add as advance
-from discs.kernels.shared import back, copy, forward, square
+from discs.kernels.shared import back, columns, copy, forward, square
 from discs.skew import Phase, add
 
 
@@ -118,7 +118,7 @@ class Room(NamedTuple):
 @fill(do.room, Central, _nrt=True)
 def _room(method: Central, chain: Any, state: TwoStep) -> Room:
     q = state.hi
-    return Room(np.empty_like(q), np.zeros_like(q), np.empty_like(q), np.empty((q.shape[0] - 2, q.shape[1])))
+    return Room(np.empty_like(q), np.zeros_like(q), np.empty_like(q), np.empty((columns(q.shape[0]), q.shape[1])))
 
 
 @fill(do.step, Central, forceinline=True)

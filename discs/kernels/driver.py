@@ -10,7 +10,7 @@ import numpy as np
 from discs.kernels import protocol as do
 from discs.kernels.compiled import interrupted, kernel, part
 from discs.kernels.limits import TURNED
-from discs.kernels.shared import ahead, forward
+from discs.kernels.shared import ahead, columns, forward
 from discs.skew import Phase
 
 POLLED = 16  # of so many steps one begins with a look for Ctrl-C; sweeps look for themselves
@@ -143,14 +143,13 @@ def observe(chain, hi, lo, v, q):
 def reduced(chain, t, y, out):
     """The reduced equations q. = C pi, pi. = -C^T (grad V - f) at a time, y = (q, pi) disc by disc, (n (rows + columns),)."""
     n, rows = chain.weights.shape[1], chain.scale.size
-    columns = rows - 2
+    width = rows + columns(rows)
     work, hi, v, c = do.workspace(chain), np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n))
-    still, p, g = np.zeros((rows, n)), np.empty((columns, n)), np.empty((columns, n))
-    width = rows + columns
+    still, p, g = np.zeros((rows, n)), np.empty((columns(rows), n)), np.empty((columns(rows), n))
     for i in range(n):
         for row in range(rows):
             hi[row, i] = y[width * i + row]
-        for row in range(columns):
+        for row in range(columns(rows)):
             p[row, i] = y[width * i + rows + row]
     do.settle(chain, work, hi, still)
     do.frame(chain, work, still, c)
@@ -159,5 +158,5 @@ def reduced(chain, t, y, out):
     for i in range(n):
         for row in range(rows):
             out[width * i + row] = v[row, i]
-        for row in range(columns):
+        for row in range(columns(rows)):
             out[width * i + rows + row] = -g[row, i]

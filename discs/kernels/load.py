@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill
+from discs.kernels.shared import column
 
 
 class Unloaded(NamedTuple):
@@ -48,7 +49,7 @@ def _loaded(load):
 @fill(do.push, Linear)
 def _push(load, state, t, move, c, p, factor, g):
     for row in range(c.shape[0]):
-        a, rate, to = c[row], p[row // 3], g[row // 3]
+        a, rate, to = c[row], p[column(row)], g[column(row)]
         constant, damping, stiffness = load.constant[row], load.damping[row], load.stiffness[row]
         hi, lo, step = state.hi[row], state.lo[row], move[row]
         for i in range(a.size):
@@ -60,6 +61,6 @@ def _push(load, state, t, move, c, p, factor, g):
 def _guide(load, c, d, g, roll, turn):
     for row in range(c.shape[0]):
         a, damping, stiffness = c[row], load.damping[row], load.stiffness[row]
-        to = turn if row == 3 else roll
+        to = turn if column(row) else roll
         for i in range(a.size):
             to[i] += a[i] * a[i] * (d * damping[i] + g * stiffness[i])

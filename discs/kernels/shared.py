@@ -1,4 +1,4 @@
-"""What chains and methods share. C acts on a disc's own momenta, roll on rows x, y, theta and turning on row phi.
+"""What chains and methods share. C acts on a disc's own momenta: `column` tells which one moves a row.
 
 c, v : (rows, n). p : (1, n), or (2, n) with own headings.
 """
@@ -8,6 +8,18 @@ import numpy as np
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.skew import Phase
+
+
+@part
+def column(row):
+    """The momentum that moves a row of q: roll, 0, moves x, y and theta; phi turns by its own, 1."""
+    return row // 3
+
+
+@part
+def columns(rows):
+    """How many momenta a disc of so many rows has."""
+    return column(rows - 1) + 1
 
 
 @part
@@ -22,7 +34,7 @@ def copy(a, to):
 def forward(c, p, v, tau=1.0):
     """v = tau C p."""
     for row in range(c.shape[0]):
-        a, q, to = c[row], p[row // 3], v[row]
+        a, q, to = c[row], p[column(row)], v[row]
         for i in range(to.size):
             to[i] = tau * a[i] * q[i]
 
@@ -53,7 +65,7 @@ def renew(c, p, tau, move, scale, change):
     """move = tau C p; returns the largest change, each row in units of its `scale`."""
     furthest = 0.0
     for row in range(c.shape[0]):
-        a, q, to = c[row], p[row // 3], move[row]
+        a, q, to = c[row], p[column(row)], move[row]
         for i in range(to.size):
             new = tau * a[i] * q[i]
             change[i] = abs(new - to[i])

@@ -93,5 +93,5 @@ def frames(problem: Problem, run: Solution | None = None) -> tuple[Float, Float]
         return z.hi.ravel(), system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi).ravel()
     if run.x_rate is None:
         raise ValueError('velocities are needed; simulate with want=("velocity",)')
-    rates = [run.omega if row == "theta" else getattr(run, f"{row}_rate") for row in system.rows]
-    return np.hstack([getattr(run, row) for row in system.rows]), np.hstack(rates)
+    q, v = (np.hstack([getattr(run, name) for name in names]) for names in (system.rows, system.rates))
+    return q, v

@@ -203,9 +203,7 @@ class March:
             shape = system.shape(frame.hi, frame.lo)
             q, energy = frame.hi + frame.lo, system.kinetic(frame.rate) + system.potential(shape)
             slip = np.hypot(*(frame.rate[:2] - system.contact(shape) * frame.rate[2])).max()
-        found = dict(zip(system.rows, q, strict=True)) | {"omega": frame.rate[2]}
-        if "phi" in found:
-            found["phi_rate"] = frame.rate[3]
+        found = dict(zip(system.rows, q, strict=True)) | dict(zip(system.rates[2:], frame.rate[2:], strict=True))
         return found | {"energy": energy, "rolling_residual": slip}
 
     def _plain(self) -> int:

@@ -57,9 +57,8 @@ Run = Callable[[Problem, Integrator, float, NDArray], Solution]
 
 def names(problem: Problem, want: Iterable[str] = ()) -> tuple[str, ...]:
     """The quantities that a run records and a tolerance can bind."""
-    rows = problem.system.rows
-    turning = ("phi_rate",) if "phi" in rows else ()
-    return (*rows, "omega", *turning, *(name for key in want for name in WANTED.get(key, ())))
+    system = problem.system
+    return (*system.rows, *system.rates[2:], *(name for key in want for name in WANTED.get(key, ())))
 
 
 def methods_for(method: str | Integrator, tol: float) -> tuple[Integrator, ...]:
