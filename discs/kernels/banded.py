@@ -9,10 +9,7 @@ eliminated downwards, those of the second half upwards, and two rows in the midd
 elimination downwards does.
 """
 
-from numba.core import types
-from numba.extending import overload
-
-from discs.kernels.compiled import PART, part
+from discs.kernels.compiled import PART, later, part
 
 FEW = 8
 
@@ -20,13 +17,6 @@ FEW = 8
 def reciprocal(z):
     """1/z, for a complex z without the care for overflow that is not needed here."""
     return 1 / z
-
-
-@overload(reciprocal, jit_options=PART)
-def _reciprocal(z):
-    if isinstance(z, types.Complex):
-        return lambda z: z.conjugate() * (1.0 / (z.real * z.real + z.imag * z.imag))
-    return lambda z: 1.0 / z
 
 
 @part
@@ -71,32 +61,42 @@ def times(x, k):
     return x * k
 
 
-@overload(at, jit_options=PART)
-def _at(b, i):
-    return (lambda b, i: b[i]) if b.ndim == 1 else (lambda b, i: (b[0, i], b[1, i]))
+def _forms_by_type():
+    from numba.core import types
+    from numba.extending import overload
+
+    @overload(reciprocal, jit_options=PART)
+    def _reciprocal(z):
+        if isinstance(z, types.Complex):
+            return lambda z: z.conjugate() * (1.0 / (z.real * z.real + z.imag * z.imag))
+        return lambda z: 1.0 / z
+
+    @overload(at, jit_options=PART)
+    def _at(b, i):
+        return (lambda b, i: b[i]) if b.ndim == 1 else (lambda b, i: (b[0, i], b[1, i]))
+
+    @overload(put, jit_options=PART)
+    def _put(b, i, x):
+        def one(b, i, x):
+            b[i] = x
+
+        def two(b, i, x):
+            b[0, i], b[1, i] = x
+
+        return one if b.ndim == 1 else two
+
+    @overload(less, jit_options=PART)
+    def _less(x, k, y):
+        if isinstance(x, types.BaseTuple):
+            return lambda x, k, y: (x[0] - k * y[0], x[1] - k * y[1])
+        return lambda x, k, y: x - k * y
+
+    @overload(times, jit_options=PART)
+    def _times(x, k):
+        return (lambda x, k: (x[0] * k, x[1] * k)) if isinstance(x, types.BaseTuple) else (lambda x, k: x * k)
 
 
-@overload(put, jit_options=PART)
-def _put(b, i, x):
-    def one(b, i, x):
-        b[i] = x
-
-    def two(b, i, x):
-        b[0, i], b[1, i] = x
-
-    return one if b.ndim == 1 else two
-
-
-@overload(less, jit_options=PART)
-def _less(x, k, y):
-    if isinstance(x, types.BaseTuple):
-        return lambda x, k, y: (x[0] - k * y[0], x[1] - k * y[1])
-    return lambda x, k, y: x - k * y
-
-
-@overload(times, jit_options=PART)
-def _times(x, k):
-    return (lambda x, k: (x[0] * k, x[1] * k)) if isinstance(x, types.BaseTuple) else (lambda x, k: x * k)
+later(_forms_by_type)
 
 
 @part

@@ -44,7 +44,7 @@ _MODULES: dict[str, dict[str, Any]] = {}  # those with parts, forms or kernels, 
 _FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
 
 
-def _tell(what: Callable[[], object]) -> None:
+def later(what: Callable[[], object]) -> None:
     """Tell numba now if it is imported, else when it is."""
     _WAITING.append(what)
     if "numba" in sys.modules:
@@ -68,7 +68,7 @@ def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
         register_jitable(**PART | options)(function)
 
-    _tell(tell)
+    later(tell)
     return function
 
 
@@ -99,7 +99,7 @@ def fill(of: Any, kind: type, **options: Any) -> Callable[[Callable[..., Any]], 
             choose.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba asks for the same one
             overload(of, jit_options=PART | options)(choose)
 
-        _tell(tell)
+        later(tell)
         of.register(kind, function)
         return function
 
@@ -259,4 +259,4 @@ def _tell_of_interrupts() -> None:
         return lambda: occurred() != 0
 
 
-_tell(_tell_of_interrupts)
+later(_tell_of_interrupts)
