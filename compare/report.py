@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from markdown_it import MarkdownIt
@@ -80,7 +79,9 @@ class Page:
         """Paragraphs, headings or tables, in Markdown."""
         self.parts += paragraphs
 
-    def figure(self, name: str, drawn: Axes | Figure, caption: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    def figure(
+        self, name: str, drawn: Axes | Figure, caption: str, columns: Sequence[str], rows: Iterable[Sequence[object]]
+    ) -> None:
         """A picture report_name.png, and what it shows as report_name.csv."""
         name = f"report_{name}"
         picture = drawn if isinstance(drawn, Figure) else drawn.figure
@@ -103,7 +104,7 @@ class Page:
         return PAGE.format(title=title, body=re.sub(r'src="([^":]+\.png)"', inlined, body))
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A table in Markdown."""
     lines = [columns, ["---"] * len(columns), *rows]
     return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)

@@ -37,7 +37,7 @@ def cases(count):
 
 @contextlib.contextmanager
 def documented():
-    """Documented errors are as good as results."""
+    """Documented errors are accepted like results."""
     with warnings.catch_warnings(), contextlib.suppress(ValueError, SimulationError):
         warnings.simplefilter("ignore")
         yield

@@ -1,4 +1,4 @@
-"""What the documents show works."""
+"""The code in the documents runs."""
 
 import re
 from pathlib import Path

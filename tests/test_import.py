@@ -1,4 +1,4 @@
-"""Importing is quick, and brings nothing that is not used."""
+"""Imports are fast and load no unused packages."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The lessons: kept without outputs, alike in form, and each runs and asserts its numbers."""
+"""The lessons: stored without outputs, of one form; each runs and asserts its numbers."""
 
 import re
 from pathlib import Path

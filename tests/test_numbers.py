@@ -1,4 +1,4 @@
-"""What merely can be turned into a number is refused as one, at every door, with a short ValueError."""
+"""Values that NumPy could convert to a number, as truth values or text, are refused by every public function."""
 
 import datetime
 from decimal import Decimal

@@ -11,6 +11,7 @@ from textwrap import shorten
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from compare import figures
 from compare.background import background
@@ -173,7 +174,7 @@ class Stability:
             found.setdefault(size, {}).setdefault(row.method, []).append((float(step.split()[0]), drift, row.found.unconverged))
         return list(found.items())[-1] if found else ("", {})
 
-    def plot(self, path: str | Path | None = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> list[Axes]:
         """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
         axes = figures.stability(*self.drifts(), self.waves)
         if path is not None:

@@ -113,7 +113,7 @@ def exudyn_steered_peer(problem: Problem) -> Peer:
     return Peer("Exudyn, wheels and beams", (45.0, 90.0, 180.0, 360.0), run, differs)
 
 
-def _build(mbs: exu.MainSystem, chain: SteeredChain, initial: State) -> list[tuple[Any, Any]]:
+def _build(mbs: exu.MainSystem, chain: SteeredChain, initial: State) -> list[tuple[int, int]]:
     """Put the chain into a system; returns the sensors of every wheel's coordinates and their rates."""
     plane = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=mbs.AddObject(items.ObjectGround())))
     zero = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0))

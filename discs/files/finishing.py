@@ -49,4 +49,4 @@ def finish(file: FrameFile, stats: Stats) -> None:
             header.attrs["stats"] = schema.fixed(text)
         header.attrs.modify("complete", 1)
     file.flush()
-    file.attrs |= {"stats": untrusted.told("stats", text), "complete": 1}
+    file.attrs |= {"stats": untrusted.decoded("stats", text), "complete": 1}

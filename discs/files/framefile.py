@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
@@ -119,7 +120,7 @@ class FrameFile:
         """Whether frames record a quantity."""
         return name in self.places
 
-    def write(self, f: int, rows: dict[str, Any]) -> None:
+    def write(self, f: int, rows: dict[str, ArrayLike]) -> None:
         """Write frame f, its checksum last."""
         data = {name: np.ascontiguousarray(value, NUMBER) for name, value in rows.items()}
         for name, value in data.items():
@@ -257,7 +258,7 @@ class FrameFile:
         """Check the header and decode its JSON in `attrs`."""
         if schema.header_checksum(self.attrs, self.static) != self.attrs["checksum"]:
             raise ValueError("parameters, times or places are not what was written")
-        self.attrs |= {name: untrusted.told(name, self.attrs[name]) for name in untrusted.TEXTS}
+        self.attrs |= {name: untrusted.decoded(name, self.attrs[name]) for name in untrusted.TEXTS}
 
 
 def _kind(name: str) -> np.dtype:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from discs.arrays import Array
 from discs.files import archive, safe
 from discs.files.finishing import put_back
 from discs.files.framefile import DAMAGE, FrameFile
@@ -27,7 +28,7 @@ class Restart:
 
     def __init__(self, path: Path) -> None:
         self.run, self.path = path, archive.restart_of(path)
-        self.kept: dict[str, Any] = {}
+        self.kept: dict[str, Array] = {}
         self._fd: int | None = None
 
     @property
@@ -79,7 +80,7 @@ class Restart:
             safe.release(self._fd, self.path if done or not os.fstat(self._fd).st_size else None)
 
 
-def read_restart(path: Path) -> dict[str, Any]:
+def read_restart(path: Path) -> dict[str, Array]:
     """The arrays of a restart file, by name; ValueError if it is damaged."""
     try:
         with open(safe.opened(path), "rb") as file, np.load(file, allow_pickle=False) as kept:

@@ -1,7 +1,8 @@
-"""What a file of a run says, and how: names, dimensions and units of its variables, a problem as data, header and checksums."""
+"""Format of run files: names, dimensions and units of variables, a problem as data, header and checksums."""
 
 import json
 import zlib
+from collections.abc import Mapping
 from dataclasses import fields
 from platform import python_version
 from typing import Any, NamedTuple
@@ -74,7 +75,7 @@ class Header(NamedTuple):
     static : variables that do not depend on time, and the times.
     """
 
-    attrs: dict[str, Any]
+    attrs: dict[str, str | int]
     static: dict[str, Float]
 
 
@@ -122,7 +123,7 @@ def header(
     """The header of a file."""
     told, arrays = describe(problem) if problem is not None else (None, {})
     static = {"time": times, "s": s} | arrays
-    attrs: dict[str, Any] = {
+    attrs: dict[str, str | int] = {
         "format": FORMAT,
         "title": f"a rod on {s.size} nodes" if "scene" in stats else f"{s.size} rolling discs",
         "unit_system": UNITS,
@@ -138,9 +139,9 @@ def header(
     return Header(attrs | {"checksum": header_checksum(attrs, static)}, static)
 
 
-def header_checksum(attrs: dict[str, Any], static: dict[str, Float]) -> int:
+def header_checksum(attrs: Mapping[str, str | int], static: dict[str, Float]) -> int:
     """Checksum of the problem, the times and the places."""
-    total = zlib.crc32(attrs["problem"].encode())
+    total = zlib.crc32(str(attrs["problem"]).encode())
     for name in sorted(static):
         total = zlib.crc32(np.ascontiguousarray(static[name]).data, total)
     return total
@@ -154,12 +155,12 @@ def frame_checksum(rows: dict[str, Float]) -> int:
     return total + WROTE
 
 
-def as_text(value: Any) -> str:
+def as_text(value: object) -> str:
     """`value` as JSON; NumPy's numbers become Python's."""
     return json.dumps(value, default=lambda number: number.tolist())
 
 
-def fixed(value: Any) -> Any:
+def fixed(value: str | int) -> np.bytes_ | int:
     """Text as a string of fixed length, which HDF5 stores in the header itself; other values unchanged."""
     return np.bytes_(value.encode()) if isinstance(value, str) else value
 

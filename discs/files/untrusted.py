@@ -28,7 +28,7 @@ STATS: dict[str, tuple[type, ...]] = {  # the stats that readers rely on; others
 }
 
 
-def told(name: str, text: str | int) -> dict[str, Any] | None:
+def decoded(name: str, text: str | int) -> dict[str, Any] | None:
     """The decoded JSON of the attribute `name`; ValueError if it has not the required types."""
     if not isinstance(text, str) or len(text) > LONGEST:
         raise ValueError(f"attribute {name!r} is not a text of at most {LONGEST} characters")

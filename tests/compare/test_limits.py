@@ -1,4 +1,4 @@
-"""Discs with headings of their own, where they tend: the files, and the rates that stand in them."""
+"""Limits of discs with own headings: the files, and the rates in them."""
 
 import csv
 

@@ -78,7 +78,7 @@ def test_every_picture_has_its_data(written):
 
 
 def test_page_needs_nothing_beside_it(written, tmp_path, browser):
-    """Alone in a folder: all pictures are there, nothing is asked of a network, and the console is silent."""
+    """Alone in a folder: all pictures are shown, nothing is loaded from a network, and the console has no message."""
     alone = tmp_path / "report.html"
     shutil.copy(written / "report.html", alone)
     browser.get(alone.as_uri())

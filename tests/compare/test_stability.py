@@ -1,4 +1,4 @@
-"""Hard cases: each expectation is met at small size, a failure is shown as one, and interrupted tables go on."""
+"""Hard cases: every expectation is met at small size, failures are marked, and interrupted tables continue."""
 
 import csv
 import os
@@ -136,7 +136,7 @@ def test_rounding(table):
 
 
 def test_peers():
-    """A peer's run is the same motion, its energy that at the end; one that is too slow says how far it came."""
+    """A peer computes the same motion; its energy is that at the end; a slow one reports the time it reached."""
     (case,) = (c for c in SMALL if c.setting == "N = 3")
     (turned,) = (c for c in SMALL if c.key == "rounding, N = 257")
     (long,) = (c for c in SMALL if c.name == "long time")

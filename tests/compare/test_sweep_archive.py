@@ -137,7 +137,7 @@ def test_results_reach_the_disc(tmp_path, monkeypatch, noted):
 
 
 def test_half_a_line_is_dropped(tmp_path, noted):
-    """As a kill in the middle of writing leaves it: the case is run again, on a line of its own."""
+    """A process killed while writing leaves half a line: the case is run again, on a new line."""
     file = tmp_path / "sweep.jsonl"
     with ThreadPoolExecutor(1) as executor:
         sweep(noting, [1, 2], executor, file, progress=False)

@@ -108,7 +108,7 @@ def deadly(n):
 
 
 def test_the_death_of_a_case_is_its_own(tmp_path, noted):
-    """However it ends its process: the others have their results, and keep them when it is tried again."""
+    """A case may end its process in any way: the others have their results, and keep them when it is repeated."""
     cases, file = [7, 3, 8, 1, 2, 9, 4, 10], tmp_path / "sweep.jsonl"
     with background(1) as workers:
         found = sweep(deadly, cases, workers, file, progress=False)
@@ -131,7 +131,7 @@ def test_a_case_that_breaks_an_executor_takes_no_other_with_it(noted):
 
 
 def leaves(n):
-    """Case 1 leaves something that ends the process of the next."""
+    """Case 1 leaves something behind that ends the process of the next case."""
     if n == 1:
         threading.Timer(0.05, os._exit, (9,)).start()
     else:

@@ -83,7 +83,7 @@ def test_field_of_a_steered_rod_of_radius_zero():
 
 @pytest.mark.parametrize("method", ["midpoint", "leapfrog", "rk4", "gauss4"])
 def test_any_method_takes_radius_zero(method):
-    """Order 2 or more on the torsion wave; only that nothing is divided by the radius is in question."""
+    """Order 2 or more on the torsion wave: no method divides by the radius."""
     run = simulate(lump(untwisting_rod(duration=1.0, **THIN), 9), method, 0.01, frames=2, progress=False, engine="plain")
     k = 3.7 / 8
     spin = Rod(**THIN)

@@ -1,4 +1,4 @@
-"""Runs as files: bit for bit, whole or refused, readable by others."""
+"""Archives: exact to the bit, complete or refused, readable by xarray."""
 
 import json
 import subprocess
@@ -16,7 +16,7 @@ from tests.conftest import ALL, models, uneven
 
 
 def same(a: Solution, b: Solution) -> None:
-    """Every array and word of two runs alike, to the bit."""
+    """Whether all arrays and texts of two runs are equal to the bit."""
     for field in fields(Solution):
         one, other = getattr(a, field.name), getattr(b, field.name)
         if isinstance(one, np.ndarray):
@@ -80,7 +80,7 @@ def test_opens_in_plain_xarray(run, saved):
 
 
 def test_a_dataset_that_xarray_wrote_is_not_trusted(run, tmp_path):
-    """Its texts are of any length; see `FrameFile._attribute`."""
+    """xarray writes text of variable length; see `FrameFile._attribute`."""
     run.to_xarray().to_netcdf(tmp_path / "by-xarray.nc", engine="h5netcdf")
     with pytest.raises(ValueError, match="attribute 'format' is not a text of fixed length"):
         load(tmp_path / "by-xarray.nc")
@@ -143,7 +143,7 @@ print(held("VmHWM"), max(own))  # getrusage would tell of the process that start
 
 
 def memory(path, discs, frames, engine):
-    """The most memory, bytes, that a process of its own held for a run into a file: all, and without the pages of files."""
+    """Peak memory, bytes, of a separate process that runs into a file: in total, and without mapped pages of files."""
     command = [sys.executable, "-c", MEMORY, str(discs), str(frames), str(path), engine]
     return map(int, subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
 

@@ -1,4 +1,4 @@
-"""A contact solver's discs against the chain's: friction makes a disc roll, and discs have room on a line that curves little."""
+"""Discs of a contact solver against those of a chain: friction makes a disc roll; discs do not touch if the line curves little."""
 
 import sys
 

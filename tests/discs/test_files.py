@@ -29,7 +29,7 @@ def stopped_at(monkeypatch, after, path, problem=PROBLEM, **options):
 
 
 def until(condition, process):
-    """Wait for something that a process does."""
+    """Wait until a condition holds in another process."""
     while not condition():
         assert process.poll() is None, process.communicate()
         time.sleep(0.01)
@@ -71,7 +71,7 @@ WITHOUT_LOCKS = (
 
 
 def test_without_locks_the_first_run_stops_and_reports_nothing_of_the_second(tmp_path):
-    """As on a file system that has none: another run takes the path."""
+    """On a file system without locks, another run may take the path."""
     path = tmp_path / "run.nc"
     first = begun(path, "-c", WITHOUT_LOCKS)
     command = [sys.executable, "-c", WITHOUT_LOCKS, *RUN, str(path), *OTHER, *OVERWRITE]
@@ -242,7 +242,7 @@ def test_archives_of_earlier_versions_open(tmp_path):
 
 
 def test_frames_of_earlier_versions_are_gone_on_with(tmp_path, monkeypatch):
-    """An archive without room for its stats, and a restart file that does not say whose it is."""
+    """An archive without space for its stats, and a restart file that does not name its run."""
     path = tmp_path / "run.nc"
     monkeypatch.setattr(schema, "STATS_ROOM", 0)
     stopped_at(monkeypatch, 9, path)

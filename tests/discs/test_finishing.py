@@ -20,7 +20,7 @@ from tests.discs.test_restart import Stop, equal
 
 
 def test_a_kill_in_the_middle_of_the_end_is_put_right(tmp_path, monkeypatch):
-    """Whatever HDF5 had written of what it changes: here half of each byte range."""
+    """HDF5 may have written any part of its changes: here half of each byte range."""
     path, whole = tmp_path / "run.nc", simulate(PROBLEM, **SETTLED)
 
     def torn(file, stats):
@@ -76,7 +76,7 @@ MOUNT = 'mount -t tmpfs -o size=600k tmpfs "$1" && exec "$2" -c "$3" "$1"'
 
 
 def test_a_disc_with_room_for_the_file_once(tmp_path):
-    """A file system of 600 kB: the end of a run needs no room of its own, and what does not fit is refused at the beginning."""
+    """On a file system of 600 kB the end of a run needs no further space, and a file that does not fit is refused at the start."""
     unshare = shutil.which("unshare")
     if not unshare or subprocess.run([unshare, "-rm", "true"], capture_output=True, check=False).returncode:
         pytest.skip("needs a file system of its own, by unshare -rm")
@@ -90,7 +90,7 @@ def test_a_disc_with_room_for_the_file_once(tmp_path):
 
 
 def test_a_disc_that_fills_up_on_the_way(tmp_path, monkeypatch):
-    """The frames have their room; without restart files the run goes on, says so, and ends as any other."""
+    """The frames have their space. Without restart files the run continues, warns, and ends normally."""
     path, whole = tmp_path / "run.nc", simulate(PROBLEM, **SETTLED)
 
     def full(*arguments, **named):

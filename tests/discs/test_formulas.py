@@ -1,4 +1,4 @@
-"""Derivatives of formulas as people write them, against closed forms; formulas that do not do."""
+"""Derivatives of common formulas against closed forms; formulas that are refused."""
 
 import math
 
@@ -96,7 +96,7 @@ def test_a_mass_that_is_not_analytic():
 
 
 def test_a_branch_on_the_way_is_noticed():
-    """The first derivative is right by the complex step, which loses the one behind the branch."""
+    """The complex step is right at first and wrong behind the branch."""
     formula = Formula("V", lambda q: q[0] ** 2 if q[0] < 1.5 else 3 * np.abs(q[0]) - 2.25, (), 1)
     for q, slope in ((1.2, 2.4), (1.6, 3.0), (1.3, 2.6)):
         np.testing.assert_allclose(formula.slopes(np.array([q])), [slope], rtol=1e-10)
@@ -105,7 +105,7 @@ def test_a_branch_on_the_way_is_noticed():
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_units_of_length_do_not_matter(scale):
-    """Also where the origin is the place."""
+    """The origin is included."""
     formula = Formula("V", lambda q: np.sin(np.abs(q[0] / scale) + 1) * np.linalg.norm([q[1] / scale, 1.0]), (), 2)
     for x, y in ((0.3, -0.4), (0.3, 0.0), (1.3, 2.4)):
         slopes = np.cos(x + 1) * np.hypot(y, 1), np.sin(x + 1) * y / np.hypot(y, 1)
@@ -113,7 +113,7 @@ def test_units_of_length_do_not_matter(scale):
 
 
 def test_a_narrow_bump_is_seen():
-    """Ten widths away a wide difference would pass over it or see nothing."""
+    """Ten widths away a long difference would pass over it or miss it."""
 
     def bump(q):
         return np.exp(-(((q[0] - 1.2) / 0.003) ** 2)) * np.abs(q[1])

@@ -99,7 +99,7 @@ def test_first_slip(model):
 
 
 def test_between_two_frames_the_earliest_disc_counts():
-    """|lambda| = 1.75 t, of weight 2, and t, of weight 1, on mu = 0.3: disc 0 at t = 0.34, disc 1 at 0.3."""
+    """|lambda| = 1.75 t with weight 2, and t with weight 1, on mu = 0.3: disc 0 slips at t = 0.34, disc 1 at 0.3."""
     run = simulate(free_discs(), dt=0.1, frames=[0.0, 2.0], want=("contact_force",), progress=False)
     force = np.zeros((2, 2, 2))
     force[:, 0, 0], force[:, 1, 1] = [0.0, -3.5], [0.0, 2.0]

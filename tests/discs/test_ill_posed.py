@@ -1,4 +1,4 @@
-"""A limp rod rolling under the field law is ill posed, and a run of it says so at the start, and only then."""
+"""A rolling rod without bending stiffness is ill posed under the field law; `simulate` warns of it, and of nothing else."""
 
 import warnings
 from dataclasses import replace

@@ -248,7 +248,7 @@ def moved(state: State, angle: float, shift: tuple[float, float], roll: float) -
 @models_and_engines(ALL, plain=ALL[1::3])
 @pytest.mark.parametrize("name", FIXED)
 def test_equivariance(name, model, engine):
-    """Moving the plane and turning all discs alike moves the motion alike."""
+    """The motion is equivariant under motions of the plane and an equal roll of all discs."""
     problem = uneven(9, model)
     other = Problem(problem.chain, moved(problem.initial, 0.7, (1.3, -2.0), 0.4), problem.duration)
     dt = 0.05 if find(name).stability_limit == np.inf else 0.005

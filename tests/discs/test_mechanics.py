@@ -129,7 +129,7 @@ def test_integrated_it_is_the_run(model):
 
 
 def test_the_sparse_saddle_point_falls_apart_into_discs():
-    """So that factors have no fill between discs and a solution takes O(n)."""
+    """The factors have no fill between discs, so that a solution takes O(n)."""
     for model, parts in ((SLAVED[2], N), (SLAVED[7], N), (STEERED[0], 2 * N)):  # with a heading's own equation
         problem = uneven(N, model)
         matrix = lagrange_dalembert(problem).saddle_point(frames(problem)[0])

@@ -65,7 +65,7 @@ def test_adaptive_methods_are_equivariant_within_their_tolerance(name, model):
 
 @models([SLAVED[2], SLAVED[7], STEERED[0]])
 def test_leapfrog_is_its_own_reverse(model):
-    """With its two moves exchanged and turned round, it goes back through the places it came from."""
+    """With its two half moves exchanged and reversed, it returns through the same positions."""
     problem, work = uneven(7, model), Work()
     method, system, h = Leapfrog(), problem.system, 0.004
     memory = method.begin(system, problem.start(), h, work)
@@ -95,7 +95,7 @@ def test_symmetries_leave_the_lagrangian(model):
 
 
 def orders(problem, measure, method, steps):
-    """Slopes of the largest residual over the steps; frames are dense, so that the spline's own error is far below."""
+    """Slopes of the largest residual against the step; frames are dense, so that the spline's error is negligible."""
     system, times = lagrange_dalembert(problem), np.linspace(0, problem.duration, 81)
     sizes = []
     for n in steps:
@@ -106,7 +106,7 @@ def orders(problem, measure, method, steps):
 
 @models(KINDS)
 def test_balance_of_momentum_and_spin(model):
-    """Momentum, moment of momentum and spin change by what the ground gives: at the method's order."""
+    """Momentum, moment of momentum and spin change by the ground's forces, at the method's order."""
     measured, sizes = orders(uneven(5, model), symmetry_momenta, tight("midpoint"), (20, 40, 80))
     assert measured == pytest.approx(2, abs=0.1), sizes
     assert sizes[0] < 0.05

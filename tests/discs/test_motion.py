@@ -1,4 +1,4 @@
-"""Motions in time: dependent constraints on the way, units, stiffness, what is warned of and what ends."""
+"""Integration in time: dependent constraints, units, stiffness, warnings and errors."""
 
 import numpy as np
 import pytest
@@ -74,7 +74,7 @@ def test_a_crank_and_a_rod_go_through_where_ways_part(method, rtol, bound):
 
 @pytest.mark.parametrize("longer", [1e-2, 1e-4, 1e-6])
 def test_a_rod_that_is_longer_turns_back(longer):
-    """A near miss is no place where ways part."""
+    """A motion that misses the branch point is not branched."""
     system, q, v = crank_slider(1 + longer)
     path = system.integrate(q, v, [0.0, 2.0], 1e-8, progress=False)
     assert path.q[-1, 0] == pytest.approx(crank(2.0, 1 + longer), abs=1e-5)
@@ -201,7 +201,7 @@ def test_lost_energy_is_said():
 
 
 def test_stiff_problems_get_an_implicit_method():
-    """A weight on a rod of stiffness 1e12 beside a slow oscillator: the slow one is what counts."""
+    """A weight on a rod of stiffness 1e12 beside a slow oscillator, which sets the accuracy."""
 
     def potential(q):
         return 0.5e12 * q[0] ** 2 + 0.5 * q[1] ** 2 + q[0] * q[1]

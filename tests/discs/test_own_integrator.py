@@ -14,7 +14,7 @@ from tests.conftest import STEERED, Model, models, uneven
 
 @dataclass(frozen=True)
 class Heun(OneStep):
-    """The explicit trapezoidal rule on the reduced equations: all that a method must be."""
+    """The explicit trapezoidal rule on the reduced equations: the smallest possible method."""
 
     name: ClassVar[str] = "heun"
     order: ClassVar[int] = 2

@@ -46,7 +46,7 @@ def stopped(monkeypatch, after, *args, **options):
 
 
 def equal(a, b):
-    """Alike to the bit, in time spent excepted."""
+    """Whether two runs are equal to the bit, except for their run time."""
     same(*(replace(run, stats={k: v for k, v in run.stats.items() if k != "seconds"}) for run in (a, b)))
 
 
@@ -82,7 +82,7 @@ def test_lsoda_whose_memory_is_hidden_takes_its_steps_again(tmp_path, monkeypatc
 
 
 def test_the_memory_matters(tmp_path, monkeypatch):
-    """Were the two-step scheme begun anew from the last frame, it would go elsewhere: what the tests above can notice."""
+    """The control: the two-step scheme, restarted from the last frame without its memory, gives another motion."""
     problem, path = uneven(7, OPEN), tmp_path / "run.nc"
     settled = {"method": "leapfrog", "dt": 0.004, "frames": 5, "engine": "plain"}
     whole = simulate(problem, **settled, progress=False)

@@ -1,4 +1,4 @@
-"""The door: frames, suggestions, refusals, and runs that go wrong."""
+"""`simulate`: frames, suggested steps, refused input, and failing runs."""
 
 import cProfile
 import pickle

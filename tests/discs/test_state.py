@@ -1,4 +1,4 @@
-"""A run's state at a frame starts another run; a run at some of its frames is a run."""
+"""The state at a frame starts another run; a selection of frames is a run."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def test_a_state_goes_on_with_the_motion(model):
 
 
 def test_headings_keep_turning():
-    """A restart from frames that lost phi_rate would have 0.0945 of the energy 0.0989."""
+    """Without phi_rate a restart from frames would have the energy 0.0945 instead of 0.0989."""
     problem = lump(steered_rod(twist=0.143, heading_inertia=0.25, duration=3.0), 17)
     run = simulate(problem, dt=0.02, frames=4, progress=False)
     assert np.abs(run.phi_rate).max() > 0.01

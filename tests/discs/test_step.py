@@ -1,4 +1,4 @@
-"""Steps to begin with, and whole steps before a time."""
+"""Initial steps, and the number of whole steps before a time."""
 
 import numpy as np
 import pytest

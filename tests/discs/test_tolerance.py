@@ -1,4 +1,4 @@
-"""Runs to a tolerance: the true error is within it, and both choices are told."""
+"""Runs to a tolerance: the true error is below it, and stats name method and step."""
 
 import pickle
 import warnings

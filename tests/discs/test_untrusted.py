@@ -23,7 +23,7 @@ def test_cut_off_files_are_refused(saved):
 
 
 def test_a_changed_byte_is_never_a_changed_run(run, saved):
-    """Each byte that is changed is noticed or does not matter to the run."""
+    """Every changed byte is detected or does not change the run."""
     whole = saved.read_bytes()
     noticed = 0
     for place in np.random.default_rng(3).integers(0, len(whole), 200):
@@ -114,7 +114,7 @@ def test_endless_words_are_refused(text, saved):
 
 
 def test_words_of_a_file_cannot_steer_a_terminal(saved, tmp_path, capsys):
-    """In what `info` prints, and in messages."""
+    """Control characters are escaped in the output of `info` and in messages."""
     evil = "\x1b[31m\x9b2J\u202e\r\nline"
     stats = {"method": evil, "scene": {"name": evil, evil: evil, "long": "x" * 10_000}}
     change(saved, attribute("stats", json.dumps(stats)))
@@ -135,7 +135,7 @@ def test_words_of_a_file_cannot_steer_a_terminal(saved, tmp_path, capsys):
 
 
 def sparse(file, size, names):
-    """Make variables 10^10 long where they are `size` long, by numbers that take no room on the disc."""
+    """Change the length of variables from `size` to 10^10 without using space on the disc."""
     made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     made.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     made.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
@@ -157,7 +157,7 @@ def sparse(file, size, names):
     ids=["some", "discs", "bends", "frames"],
 )
 def test_a_sparse_giant_is_refused_at_once(size, names, message, tmp_path):
-    """Whether or not its sizes fit: at the first numbers that are not there."""
+    """The first missing numbers are detected, whether or not the sizes agree."""
     path = tmp_path / "giant.nc"
     simulate(uneven(9, Model("springs", "field")), dt=0.05, frames=4, progress=False, engine="plain").save(path)
     with h5py.File(path, "r+") as file:

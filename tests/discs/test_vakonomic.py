@@ -1,4 +1,4 @@
-"""Each mechanics against its own principle, written out here without the equations of the module."""
+"""Both mechanics against their variational principles, without the equations of the module."""
 
 from dataclasses import replace
 
@@ -182,7 +182,7 @@ def test_on_an_incline_the_nonholonomic_disc_does_not_descend():
 
 
 def test_an_integrable_constraint_cannot_tell():
-    """A pendulum, r.r. = 0: dA = 0, one motion whatever mu(0)."""
+    """A pendulum, r.r. = 0: dA = 0, so the motion does not depend on mu(0)."""
     weight = np.array([0.3, -1.1])
     pendulum = MechanicalSystem.from_lagrangian(("x", "y"), M * np.eye(2), lambda q: -weight @ q, lambda q: q[None], ("rod",))
     q, v, times = np.array([0.6, 0.8]), np.array([-0.8, 0.6]), np.linspace(0, 4, 9)

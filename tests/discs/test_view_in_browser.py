@@ -236,7 +236,7 @@ def test_a_title_is_shown_and_not_run(browser, folder, run, title):
 
 
 def test_only_the_pages_own_scripts_run(browser, folder, run):
-    """As if data had found a way to become markup: a script, a handler and a picture from elsewhere are put into the page."""
+    """A script, an event handler and an external picture are put into the page, as if data had become markup."""
     page = run.view().page
     more = "<script>globalThis.hacked = 1</script><img src='data:,' onerror='globalThis.hacked = 2'><img src='https://localhost/a.png'>"
     (folder / "more.html").write_text(page.replace("</body>", more + "</body>"), encoding="ascii")

@@ -1,4 +1,4 @@
-"""Warnings name the line of the user's program, through every door."""
+"""Warnings point to the line of the user's program, from every public function."""
 
 import subprocess
 import sys
@@ -23,7 +23,7 @@ QUIET = {"dt": 0.05, "frames": 2, "progress": False}
 
 
 def doors():
-    """Calls that warn, each with the words of its warning."""
+    """Calls that warn, each with text of its warning."""
     yield "ill-posed", lambda: simulate(ROLLING, **QUIET), "ill posed"
     yield "ill-posed-plain", lambda: simulate(ROLLING, "gauss4", engine="plain", **QUIET), "ill posed"
     yield "auto", lambda: simulate(ROLLING, "auto", tol=0.1, frames=2, progress=False), "ill posed"
