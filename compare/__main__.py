@@ -12,6 +12,8 @@ from compare.hardcases.table import Stability, kept, stability
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
+from compare.random_runs import gathered as runs_of
+from compare.random_runs import trust_runs
 from compare.results import WorkPrecision
 from compare.sweeps import read
 from compare.trust import gathered, trust
@@ -79,12 +81,14 @@ def add_trust(p: argparse.ArgumentParser) -> None:
 
 def run_trust(options: argparse.Namespace) -> None:
     """Run random scenes and write the table. If interrupted, write the results so far; the same command continues the run."""
-    archive = Path(options.out) / "trust.jsonl"
+    runs = options.problems is not None
+    archive = Path(options.out) / ("trust-runs.jsonl" if runs else "trust.jsonl")
+    measure, collect, count = (trust_runs, runs_of, options.problems) if runs else (trust, gathered, options.scenes)
     try:
-        found = trust(options.scenes, options.seed, options.first, options.seconds, archive=archive, progress=not options.quiet)
+        found = measure(count, options.seed, options.first, options.seconds, archive=archive, progress=not options.quiet)
     except KeyboardInterrupt:
         if archive.exists():
-            write_trust(gathered(read(archive)), options.out)
+            write_trust(collect(read(archive)), options.out)
             print(f"interrupted: {options.out} has the results so far; the same command continues the run", file=sys.stderr)
         raise
     write_trust(found, options.out)

@@ -136,7 +136,8 @@ def discs_row(drawn: Drawn, row: Row, seconds: float) -> Row:
     def apart(a: Solution, b: Solution) -> float:
         return relative(float(np.abs(getattr(a, name) - getattr(b, name)).max()) for name in names)
 
-    row = row._replace(estimate=relative((found.error_estimate or {})[name] for name in names))
+    estimate = relative((found.error_estimate or {})[name] for name in names)
+    row = row._replace(estimate=estimate, limited=found.stats.get("limited_by", ""))
     h = problem.duration / max(round(problem.duration / found.stats["dt"]), 25)
     try:
         with at_most(4 * seconds), warnings.catch_warnings():

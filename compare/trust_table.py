@@ -23,7 +23,7 @@ class Row(NamedTuple):
     error, estimate : largest over positions and angles, as tol counts them; NaN where unknown. ratio : estimate over error, NaN
     where the error is too small to be known. seconds : processor time. reference, reference_error : what it is held against.
     unlike : by how many times their own error chains differ from the finer field. says : the refusal's words, or warnings.
-    shown : of a refusal, what chains do.
+    shown : of a refusal, what chains do. limited : what made a run as accurate as it is, as its stats say; of fields nothing.
     """
 
     scene: str
@@ -43,6 +43,12 @@ class Row(NamedTuple):
     unlike: float = np.nan
     says: str = ""
     shown: str = ""
+    limited: str = ""
+
+    @property
+    def counts(self) -> bool:
+        """Whether its ratio counts: it is known, and nothing but the tolerance limits the run."""
+        return bool(np.isfinite(self.ratio)) and self.limited in ("", "tolerance")
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,7 @@ class Trust:
         for by in ("solve", "simulate"):
             rows = self.of(by)
             counts = [str(sum(r.outcome == outcome for r in rows)) for outcome in OUTCOMES]
-            ratios = np.array([r.ratio for r in rows if np.isfinite(r.ratio)] or [np.nan])
+            ratios = np.array([r.ratio for r in rows if r.counts] or [np.nan])
             spare = np.array([r.tol / r.error for r in rows if r.error > 0] or [np.nan])
             seconds = np.array([r.seconds for r in rows] or [np.nan])
             quantiles = [f"{np.quantile(ratios, p):.2g}" for p in (0.0, 0.5, 0.9, 1.0)]
@@ -101,7 +107,7 @@ class Trust:
         for r in self.rows:
             if r.outcome == "ABOVE":
                 lines.append(f"* above: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}, error {r.error:.1e}")
-            if r.ratio > MOST:
+            if r.counts and r.ratio > MOST:
                 words = f"estimate over error {r.ratio:.0f}, tolerance over estimate {r.tol / r.estimate:.2g}"
                 lines.append(f"* cautious: {r.scene} ({r.kind}, {r.law}, {r.by}), {words}")
             if r.unlike > LEAST:

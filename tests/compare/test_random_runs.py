@@ -1,0 +1,66 @@
+"""Random problems of discs: what they are, a small sample of them, and that wrong runs and refusals are told."""
+
+from dataclasses import replace
+
+import pytest
+
+from compare import random_runs as module
+from compare.__main__ import main
+from compare.random_runs import SIZES, Runs, examine, random_problem
+from compare.trust_table import LEAST, MOST, Row
+from discs import SimulationError
+
+SAMPLE = (0, 3)  # both laws; chosen for their time only
+
+
+def row_of(index, seconds=20.0):
+    return Row(*examine([3, index, seconds]))
+
+
+def test_problems_are_of_all_kinds():
+    drawn = [random_problem(3, index) for index in range(60)]
+    assert {row.law for _, _, row in drawn} == {"field", "unit", "true", "own"}
+    assert {problem.chain.ends for problem, _, _ in drawn} == {"springs", "consistent", "paper", "ring"}
+    assert all(SIZES[0] <= problem.chain.n <= SIZES[1] and 1e-8 <= tol <= 1e-2 for problem, tol, _ in drawn)
+    again, tol, _ = random_problem(3, 7)
+    assert (again.initial.theta == drawn[7][0].initial.theta).all()
+    assert tol == drawn[7][1]
+
+
+@pytest.mark.parametrize("index", SAMPLE)
+def test_tolerances_are_kept(index):
+    row = row_of(index)
+    assert row.outcome == "within", row
+    assert row.reference_error <= row.tol / LEAST
+    assert not row.counts or 1 <= row.ratio <= MOST, row
+
+
+def test_wrong_runs_and_refusals_are_told(monkeypatch):
+    true = module.simulate
+
+    def off(problem, method, *args, **options):
+        found = true(problem, method, *args, **options)
+        return found if method != "auto" else replace(found, x=found.x + 3 * options["tol"] * abs(found.x).max())
+
+    monkeypatch.setattr(module, "simulate", off)
+    row = row_of(0)
+    assert row.outcome == "ABOVE"
+    assert "* above: 3:0" in Runs([row], []).summary()
+
+    def loses(problem, method, *args, **options):
+        if method == "auto":
+            raise SimulationError("a disc lost its heading", 10, 0.1, 0)
+        return true(problem, method, *args, **options)
+
+    monkeypatch.setattr(module, "simulate", loses)
+    row = row_of(0)
+    assert row.outcome == "refused"
+    assert "NOT TRUE" in Runs([row], []).summary()
+
+
+def test_command_line(tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = ["trust", "--problems", "1", "--seed", "3", "--seconds", "20", "--quiet", "--out", str(out)]
+    assert main(arguments) == 0
+    assert sorted(path.name for path in out.iterdir()) == ["trust.csv", "trust.md"]
+    assert "| all | 1 | 0 | 0 | 0 | 0 |" in capsys.readouterr().out
