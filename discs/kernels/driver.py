@@ -33,7 +33,7 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
     rows, n = before.hi.shape
     few, vanishing = looks.size > 0 and looks[0] < 3, do.vanishing(chain)
     half, c, slope = np.empty((rows, n * vanishing)), np.empty((rows, n * (few or vanishing))), np.zeros((2, n))
-    g = np.empty((rows - 2, n * few))
+    g = np.empty((columns(rows), n * few))
     gradients, solves, unconverged, lost, passed, doubted, blown = 0, 0, 0, -1, 0, False, False
     due = looks[0] - first if looks.size else -1  # steps of this call
     do.settle(chain, work, before.hi, before.lo)

@@ -132,7 +132,7 @@ def _kick(before, after, chain, work, t, h, c, g, defect):
     do.frame(chain, work, defect, c)
     do.pullback(chain, work, before, t, defect, c, before.pi, g)
     for row in range(c.shape[0]):
-        a, pull, start, end, to = c[row], g[row // 3], before.pi[row // 3], after.pi[row // 3], defect[row]
+        a, pull, start, end, to = c[row], g[column(row)], before.pi[column(row)], after.pi[column(row)], defect[row]
         for i in range(to.size):
             to[i] = 2 * h * a[i] * (h * pull[i] + (end[i] - start[i]))
     do.settle(chain, work, after.hi, after.lo)
