@@ -19,8 +19,6 @@ from discs.kernels import protocol as do
 from discs.kernels.slaved_matrix import GHOST, PLAIN, RING
 from tests.conftest import Model, uneven
 
-pytestmark = pytest.mark.slow
-
 RNG = np.random.default_rng(5)
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 
@@ -120,6 +118,7 @@ def test_a_link_law_is_energy_exact_and_its_compiled_form_is_the_plain_one(name,
     assert np.allclose(own, law.tension(secant), rtol=1e-11, atol=1e-12 * np.abs(pull).max())
 
 
+@pytest.mark.slow  # kernels of every pair
 @pytest.mark.parametrize("curvature", CURVATURE)
 @pytest.mark.parametrize("rolling", ROLLING)
 def test_every_pair_of_laws_keeps_the_energy_and_rolls_alike_on_both_engines(rolling, curvature):
@@ -142,7 +141,9 @@ def test_a_law_of_ones_own_runs_on_the_plain_engine(blend):
     assert abs(run.energy[-1] / problem.energy() - 1) < 1e-12
     assert run.rolling_residual.max() < 1e-14
     others = [
-        simulate(semidiscretise(untwisting_rod(law, duration=0.5), 9, "springs"), dt=0.02, frames=[0.5], progress=False)
+        simulate(
+            semidiscretise(untwisting_rod(law, duration=0.5), 9, "springs"), dt=0.02, frames=[0.5], engine="plain", progress=False
+        )
         for law in ("field", "unit")
     ]
     apart = np.abs(others[0].x - others[1].x).max()
