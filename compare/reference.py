@@ -9,7 +9,7 @@ from discs.arrays import Float
 def reference(problem: Problem, steps: int = 1000) -> tuple[Float, float]:
     """Positions at the end by "gauss8" with 2 `steps` steps, (rows, n), and the change from half as many."""
     found = []
-    fewest = steps if problem.system.kernel is not None else steps // 4  # the plain form takes 50 times as long
+    fewest = steps if problem.system.parameters is not None else steps // 4  # the plain form takes 50 times as long
     for count in (fewest, 2 * fewest):
         run = simulate(problem, Gauss8(tolerance=1e-14, sweeps=20), problem.duration / count, frames=1, progress=False)
         found.append(np.array([getattr(run, row)[-1] for row in problem.system.rows]))

@@ -41,10 +41,10 @@ def step(
     a, pairs = rule.a, (rule.pairs, rule.pairs_in, rule.pairs_out)
     base = z.hi + z.lo
     p = np.array([z.pi] * stages)
-    v = rod.forward(rod.frame(base), p)
+    v = rod.forward(rod.basis(base), p)
     results: list[tuple[NDArray, NDArray, NDArray]] = []
     for sweep in range(1, sweeps + 1):
-        c = rod.frame(base + h * np.tensordot(a, v, 1))
+        c = rod.basis(base + h * np.tensordot(a, v, 1))
         force = rod.back(c, rod.mean_force(base + h * np.tensordot(a, rod.forward(c, p), 1)))
         rest = z.pi - p - h * np.tensordot(a, force, 1)
         for value, into, out in zip(*pairs, strict=True):

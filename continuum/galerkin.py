@@ -34,8 +34,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from continuum.bases import polynomials, waves
 from continuum.density import Density
+from continuum.functions import polynomials, waves
 from continuum.initial import Resolved, resolve
 from continuum.rod import Scene
 from discs.chains.rolling import ROLLING
@@ -52,7 +52,7 @@ class Modes(NamedTuple):
     back: NDArray
 
 
-class Frame(NamedTuple):
+class Basis(NamedTuple):
     """C at a configuration (or several, with one more axis before): e (n,) and t = 1/sqrt(w (alpha + rho |e|^2)) at the nodes; e'',
     2 e', e (3, F) at the finer points."""
 
@@ -64,7 +64,7 @@ class Frame(NamedTuple):
 class SpectralRod(SkewGradient):
     """The equations of motion of a scene on n functions.
 
-    Rows x, y of a configuration are coefficients of the `basis`, row theta is what is added to the initial theta, at the nodes.
+    Rows x, y of a configuration are coefficients of the `functions`, row theta is what is added to the initial theta, at the nodes.
 
     Attributes
     ----------
@@ -82,13 +82,13 @@ class SpectralRod(SkewGradient):
         rod = scene.rod
         self.closed = scene.closed
         self.n, self.law, self._radius, self._scene = n, ROLLING[scene.rolling], rod.radius, scene
-        self.basis = (waves if scene.closed else polynomials)(n, density or Density(rod.length))
+        self.functions = (waves if scene.closed else polynomials)(n, density or Density(rod.length))
         self.scale = np.array([rod.length, rod.length, 1.0])
-        self.bending, self.torsion = rod.bending_stiffness * self.basis.bending, rod.torsion_stiffness * self.basis.torsion
+        self.bending, self.torsion = rod.bending_stiffness * self.functions.bending, rod.torsion_stiffness * self.functions.torsion
         self._rates, self._bends, self._project = (
-            np.ascontiguousarray(matrix.T) for matrix in (self.basis.rates, self.basis.bends, self.basis.project)
+            np.ascontiguousarray(matrix.T) for matrix in (self.functions.rates, self.functions.bends, self.functions.project)
         )
-        self._mass, self._spin = self.basis.w * rod.density, self.basis.w * rod.spin_inertia
+        self._mass, self._spin = self.functions.w * rod.density, self.functions.w * rod.spin_inertia
         stiffness = rod.torsion_stiffness * rod.length**2 + rod.bending_stiffness * rod.radius**2
         self.crossing = rod.length**2 * np.sqrt(rod.inertia / stiffness) if stiffness else np.inf
         self._shift = complex(*scene.shift) / rod.length  # of a closed rod's line; z is the slope of the rest plus this
@@ -96,16 +96,16 @@ class SpectralRod(SkewGradient):
         self.start = self._start(resolve(scene))
 
     @cached_property
-    def kernel(self) -> Any:
+    def parameters(self) -> Any:
         """The parameters for the compiled form of steps."""
         from continuum.kernels.spectral import Spectral
 
         return Spectral(
             bends=self._bends,
             rates=self._rates,
-            back=np.ascontiguousarray(self.basis.rates),
+            back=np.ascontiguousarray(self.functions.rates),
             project=self._project,
-            pull=np.ascontiguousarray(self.basis.project),
+            pull=np.ascontiguousarray(self.functions.project),
             bending=self.bending,
             torsion=self.torsion,
             twist=self.twist,
@@ -120,35 +120,37 @@ class SpectralRod(SkewGradient):
     @cached_property
     def line(self) -> NDArray:
         """Coefficients of r to its values at the nodes, (n, n)."""
-        return self.basis.line(self.basis.s)
+        return self.functions.line(self.functions.s)
 
     def _start(self, initial: Resolved) -> Phase:
         """The initial state; sets the twist, and the offset of V that makes the energy at the start that of the initial fields."""
-        scene, basis = self._scene, self.basis
+        scene, functions = self._scene, self.functions
         s, w = initial.quadrature(DATA + self.n // 2)
         fields, ends = scene.fields(s), np.array([0.0, scene.rod.length])
         at_ends = scene.fields(ends)
-        moment = basis.field(ends, 1).T @ (np.array([-1, 1]) * at_ends["theta"]) - basis.field(s, 2).T @ (w * fields["theta"])
+        moment = functions.field(ends, 1).T @ (np.array([-1, 1]) * at_ends["theta"]) - functions.field(s, 2).T @ (
+            w * fields["theta"]
+        )
         self.twist = scene.rod.torsion_stiffness * moment
         a = np.zeros(self.n, complex)
-        if basis.ends:
-            a[: basis.ends] = at_ends["x"] + 1j * at_ends["y"]
-        root, line = np.sqrt(w), basis.line(s)
-        rest = fields["x"] + 1j * fields["y"] - self._shift * s - line[:, : basis.ends] @ a[: basis.ends]
-        a[basis.ends :] = np.linalg.lstsq(root[:, None] * line[:, basis.ends :], root * rest, rcond=None)[0]
+        if functions.ends:
+            a[: functions.ends] = at_ends["x"] + 1j * at_ends["y"]
+        root, line = np.sqrt(w), functions.line(s)
+        rest = fields["x"] + 1j * fields["y"] - self._shift * s - line[:, : functions.ends] @ a[: functions.ends]
+        a[functions.ends :] = np.linalg.lstsq(root[:, None] * line[:, functions.ends :], root * rest, rcond=None)[0]
         q = np.array([a.real, a.imag, np.zeros(self.n)])
-        omega = basis.field(s).T @ (w * fields["omega"]) / basis.w
-        start = Phase(q, np.zeros_like(q), omega / self.frame(q).t)
+        omega = functions.field(s).T @ (w * fields["omega"]) / functions.w
+        start = Phase(q, np.zeros_like(q), omega / self.basis(q).t)
         self._offset = initial.energy - self.energy(start)
         return start
 
     def slopes(self, z: Phase) -> NDArray:
         """r' at the nodes, (..., n), as a complex number."""
-        xy = (z.hi + z.lo)[..., :2, :] @ self.basis.bends[: self.n].T
+        xy = (z.hi + z.lo)[..., :2, :] @ self.functions.bends[: self.n].T
         return xy[..., 0, :] + 1j * xy[..., 1, :] + self._shift
 
     def _omega(self, z: Phase) -> NDArray:
-        """omega at the nodes, (..., n); as `frame` has it, without the finer points."""
+        """omega at the nodes, (..., n); as `basis` has it, without the finer points."""
         e = self._radius * self.law.size(np.abs(self.slopes(z)))
         return z.pi / np.sqrt(self._spin + self._mass * e**2)
 
@@ -165,7 +167,7 @@ class SpectralRod(SkewGradient):
 
     def reader(self, s: NDArray) -> Callable[[Phase], dict[str, NDArray]]:
         """A function of states, several at once by leading axes, that returns x, y, theta, omega at places s, each (..., S)."""
-        line, field, theta = self.basis.line(s), self.basis.field(s), self._scene.fields(s)["theta"]
+        line, field, theta = self.functions.line(s), self.functions.field(s), self._scene.fields(s)["theta"]
 
         def at(z: Phase) -> dict[str, NDArray]:
             q = z.hi + z.lo
@@ -176,7 +178,7 @@ class SpectralRod(SkewGradient):
 
     def slip(self, z: Phase) -> NDArray:
         """Largest |r. - e omega| at the nodes: what the projection leaves of the constraint; several at once by leading axes."""
-        c = self.frame(z.hi + z.lo)
+        c = self.basis(z.hi + z.lo)
         rates = self.forward(c, z.pi)
         moved = (rates[..., 0, :] + 1j * rates[..., 1, :]) @ self.line.T
         return np.abs(moved - c.e * rates[..., 2, :]).max(axis=-1)
@@ -189,18 +191,18 @@ class SpectralRod(SkewGradient):
 
     # All of these take several configurations at once, by leading axes
 
-    def frame(self, shape: NDArray) -> Frame:
+    def basis(self, shape: NDArray) -> Basis:
         xy = shape[..., :2, :] @ self._bends
         z = xy[..., 0, :] + 1j * xy[..., 1, :]
-        n, f = self.n, self.basis.project.shape[1] - self.n
+        n, f = self.n, self.functions.project.shape[1] - self.n
         at, slope, bend, bent = z[..., :n] + self._shift, z[..., n : n + f] + self._shift, z[..., n + f : -f], z[..., -f:]
         e = 1j * self._radius * self.law.jet(at, 0 * at, 0 * at)[0]
         h, h1, h2 = self.law.jet(slope, bend, bent)
         fine = np.stack([h2, 2 * h1, h], axis=-2)
         t = 1 / np.sqrt(self._spin + self._mass * (e.real**2 + e.imag**2))
-        return Frame(e, t, 1j * self._radius * fine)
+        return Basis(e, t, 1j * self._radius * fine)
 
-    def forward(self, c: Frame, p: NDArray) -> NDArray:
+    def forward(self, c: Basis, p: NDArray) -> NDArray:
         omega = c.t * p
         rates = (omega @ self._rates).reshape(*omega.shape[:-1], 3, -1)
         moves = np.concatenate([(c.finer * rates).sum(axis=-2), c.e * omega], axis=-1)
@@ -209,20 +211,20 @@ class SpectralRod(SkewGradient):
         out[..., 2, :] = omega
         return out
 
-    def back(self, c: Frame, g: NDArray) -> NDArray:
-        pull = g[..., :2, :] @ self.basis.project
+    def back(self, c: Basis, g: NDArray) -> NDArray:
+        pull = g[..., :2, :] @ self.functions.project
         pull = pull[..., 0, :] - 1j * pull[..., 1, :]
         fine = (c.finer * pull[..., None, : -self.n]).real
-        return c.t * (fine.reshape(*g.shape[:-2], -1) @ self.basis.rates + (c.e * pull[..., -self.n :]).real + g[..., 2, :])
+        return c.t * (fine.reshape(*g.shape[:-2], -1) @ self.functions.rates + (c.e * pull[..., -self.n :]).real + g[..., 2, :])
 
-    def frames(self, shape: NDArray, moves: NDArray) -> Frame:
-        return self.frame(shape + moves)
+    def bases(self, shape: NDArray, moves: NDArray) -> Basis:
+        return self.basis(shape + moves)
 
-    def forwards(self, frames: Frame, p: NDArray) -> NDArray:
-        return self.forward(frames, p)
+    def forwards(self, bases: Basis, p: NDArray) -> NDArray:
+        return self.forward(bases, p)
 
-    def pulls(self, frames: Frame, shape: NDArray, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
-        return self.back(frames, self.mean_force(shape + moves))
+    def pulls(self, bases: Basis, shape: NDArray, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
+        return self.back(bases, self.mean_force(shape + moves))
 
     def potential(self, shape: NDArray) -> float:
         return float(self._potentials(shape))
@@ -235,17 +237,17 @@ class SpectralRod(SkewGradient):
         out[..., 2, :] = secant[..., 2, :] @ self.torsion + self.twist
         return out
 
-    def modes(self, c: Frame) -> Modes:
+    def modes(self, c: Basis) -> Modes:
         """The eigenvectors of C^T (grad^2 V) C: with them (I + g C^T (grad^2 V) C)^-1 takes two products for any g."""
         n, points = self.n, c.finer.shape[1]
         moves = np.zeros((n, points + n), complex)  # e psi of every function
-        moves[:, :points] = (c.finer * self.basis.rates.reshape(3, points, n).transpose(2, 0, 1)).sum(axis=1)
+        moves[:, :points] = (c.finer * self.functions.rates.reshape(3, points, n).transpose(2, 0, 1)).sum(axis=1)
         moves[:, points:] = np.diag(c.e)
         xy = np.hstack([moves.real @ self._project, moves.imag @ self._project]).reshape(n, 2, n)
         bent = (xy * self.bending).reshape(n, 2 * n) @ xy.reshape(n, 2 * n).T
         values, vectors = np.linalg.eigh(c.t[:, None] * (bent + self.torsion) * c.t)
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 
-    def solve(self, secant: NDArray, c: Frame, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
+    def solve(self, secant: NDArray, c: Basis, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
         values, vectors, back = self.modes(c)
         return vectors @ ((back @ rhs) / (1 + g * values))

@@ -112,8 +112,8 @@ class Steps:
         fresh = self._modes is None or self._excess > MODES * self.rod.n / self._stages
         while True:
             if fresh:
-                c = self.rod.frame(z.hi + z.lo)
-                self._modes = self.rod.modes(self.rod.frame(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi)))
+                c = self.rod.basis(z.hi + z.lo)
+                self._modes = self.rod.modes(self.rod.basis(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi)))
             after, v, p, taken = self._sweep(z, h)
             if fresh:
                 self._usual, self._excess = taken, 0
@@ -131,7 +131,7 @@ class Steps:
 
         after = Phase(z.hi.copy(), z.lo.copy(), z.pi.copy())
         v, p = np.empty((self._stages, 3, self.rod.n)), np.empty((self._stages, self.rod.n))
-        taken = step(self.rod.kernel, *after, self._modes, tableau(self._stages), h, SWEEPS, self._sweeps, v, p)
+        taken = step(self.rod.parameters, *after, self._modes, tableau(self._stages), h, SWEEPS, self._sweeps, v, p)
         return after, v, p, taken
 
     def _advance(self, t: float, z: Phase) -> tuple[float, Phase, NDArray, NDArray]:

@@ -167,7 +167,8 @@ def _run(
     checked : look at the error of the steps. more : what else `stats` tells. estimate : of the error, if it is known.
     """
     want = () if want == () else wanted(want, integrator.offers)
-    compiled = checks.choice("engine", engine, ENGINES) == "compiled" and problem.system.kernel is not None and integrator.compiles
+    wished = checks.choice("engine", engine, ENGINES) == "compiled"
+    compiled = wished and problem.system.parameters is not None and integrator.compiles
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:

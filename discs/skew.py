@@ -100,7 +100,7 @@ class SkewGradient(ABC):
         """The shape after a change dq (rows, n) of the positions."""
 
     @abstractmethod
-    def frame(self, shape: Any) -> Any:
+    def basis(self, shape: Any) -> Any:
         """C, as `forward`, `back` and `solve` take it."""
 
     @abstractmethod
@@ -150,15 +150,15 @@ class SkewGradient(ABC):
 
     # Several configurations, the stages of a step; here one after the other, a system may take them at once
 
-    def frames(self, shape: Any, moves: NDArray) -> Any:
+    def bases(self, shape: Any, moves: NDArray) -> Any:
         """C after each of `moves` (stages, rows, n)."""
-        return [self.frame(self.moved(shape, move)) for move in moves]
+        return [self.basis(self.moved(shape, move)) for move in moves]
 
-    def forwards(self, frames: Any, p: NDArray) -> NDArray:
+    def forwards(self, bases: Any, p: NDArray) -> NDArray:
         """C p of each, (stages, rows, n)."""
-        return np.array([self.forward(c, stage) for c, stage in zip(frames, p, strict=True)])
+        return np.array([self.forward(c, stage) for c, stage in zip(bases, p, strict=True)])
 
-    def pulls(self, frames: Any, shape: Any, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
+    def pulls(self, bases: Any, shape: Any, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
         """C^T (grad V - f) at times t (stages,), after each of `moves` from z, of the shape of p."""
-        stages = zip(frames, t, moves, p, strict=True)
+        stages = zip(bases, t, moves, p, strict=True)
         return np.array([self.pull(c, self.gradient(self.moved(shape, m)), time, z, m, own) for c, time, m, own in stages])

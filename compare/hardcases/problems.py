@@ -159,7 +159,7 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
         while run.step < round(t / h):
             run.on(round(t / h))
         z = run.memory
-        c, v = system.frame(system.shape(z.hi, z.lo)), z.next / h
+        c, v = system.basis(system.shape(z.hi, z.lo)), z.next / h
         off = v - system.forward(c, system.back(c, system.weights * v))
         share = max(share, float(np.sqrt(system.kinetic(off) / problem.energy())))
         onset = t if np.isnan(onset) and share > 0.1 else onset

@@ -208,7 +208,7 @@ class Watched(reduced.Bound):
     def __init__(self, problem: Problem, seconds: float) -> None:
         from discs.kernels import driver
 
-        chain = problem.system.kernel
+        chain = problem.system.parameters
         super().__init__(problem, lambda t, y, out: driver.reduced(chain, t, np.ascontiguousarray(y), out))
         self.duration, self.seconds, self.t, self.gave_up, self.begun = problem.duration, seconds, 0.0, "", processor()
 

@@ -87,7 +87,7 @@ def _build(mbs: Any, problem: Problem) -> float:
     system: Any = problem.system
     z = problem.start()
     n, q0 = system.n, z.hi
-    v0 = system.forward(system.frame(system.shape(q0)), z.pi)
+    v0 = system.forward(system.basis(system.shape(q0)), z.pi)
     at_origin = system.shape(np.zeros_like(q0))  # not zero if the chain closes up to a shift
     along, roll = system._springs.hessians()
     by_disc = np.arange(3 * n).reshape(3, n).T.ravel()

@@ -178,7 +178,7 @@ def _pull(problem: Problem) -> Callable[[Float, Float], None]:
     from discs.kernels import protocol as do
     from discs.kernels.compiled import jit
 
-    chain, n, rows = problem.system.kernel, problem.chain.n, len(problem.system.rows)
+    chain, n, rows = problem.system.parameters, problem.chain.n, len(problem.system.rows)
     order = np.array(ORDER)
 
     @jit
@@ -189,7 +189,7 @@ def _pull(problem: Problem) -> Callable[[Float, Float], None]:
             for row in range(rows):
                 q[row, i] = position[5 * i + order[row]]
         do.settle(chain, work, q, still)
-        do.frame(chain, work, still, c)
+        do.basis(chain, work, still, c)
         do.gradient(chain, work, still, g)
         for i in range(n):
             for row in range(rows):

@@ -23,7 +23,7 @@ def multiplier_peer(problem: Problem) -> Peer:
     width = 2 * rows + 2
     z = problem.start()
     shape = system.shape(z.hi)
-    v0 = system.forward(system.frame(shape), z.pi)
+    v0 = system.forward(system.basis(shape), z.pi)
     compiled = _residual(problem)
 
     def residual(t: float, y: Float, yp: Float, out: Float) -> None:
@@ -69,7 +69,7 @@ def _residual(problem: Problem) -> Callable[[Float, Float, Float], None]:
     from discs.kernels import protocol as do
     from discs.kernels.compiled import jit
 
-    system, chain = problem.system, problem.system.kernel
+    system, chain = problem.system, problem.system.parameters
     rows, n = len(system.rows), system.n
     weights, width = np.array(system.weights), 2 * len(system.rows) + 2
 
@@ -81,7 +81,7 @@ def _residual(problem: Problem) -> Callable[[Float, Float, Float], None]:
             for row in range(rows):
                 q[row, i] = y[width * i + row]
         do.settle(chain, work, q, still)
-        do.frame(chain, work, still, c)
+        do.basis(chain, work, still, c)
         do.gradient(chain, work, still, g)
         for i in range(n):
             at = width * i
@@ -108,7 +108,7 @@ def saddle_peer(problem: Problem) -> Peer:
     rows, n = len(system.rows), system.n
     size = rows * n
     z = problem.start()
-    v0 = system.forward(system.frame(system.shape(z.hi)), z.pi)
+    v0 = system.forward(system.basis(system.shape(z.hi)), z.pi)
     calls, until = [0], [np.inf]
     disc = np.arange(n)
 

@@ -21,7 +21,7 @@ def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
 
     Compiled once, for arrays like y that must not change, as SUNDIALS hands them over; SciPy's are taken as such.
     """
-    if problem.system.kernel is None:
+    if problem.system.parameters is None:
         plain = Reduced(problem.system)
 
         def in_numpy(t: float, y: Float, out: Float) -> None:
@@ -31,7 +31,7 @@ def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
     from discs.kernels import driver
     from discs.kernels.compiled import jit
 
-    chain, inner = problem.system.kernel, jit(driver.reduced.__wrapped__)  # type: ignore[attr-defined]
+    chain, inner = problem.system.parameters, jit(driver.reduced.__wrapped__)  # type: ignore[attr-defined]
 
     @jit
     def f(t, y, out):  # type: ignore[no-untyped-def]

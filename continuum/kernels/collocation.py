@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from continuum.kernels.spectral import blank, force, forward, frame, part, settle
+from continuum.kernels.spectral import basis, blank, force, forward, part, settle
 from discs.kernels.compiled import kernel
 from discs.kernels.shared import add
 from discs.skew import Phase
@@ -140,11 +140,11 @@ def step(rod, hi, lo, pi, modes, tableau, h, sweeps, tolerance, v, momentum):
             p[i, 0, k] = pi[k]
             for row in range(3):
                 q[i, row, k] = base[0, row, k]
-    frame(rod, work, q, stages)
+    basis(rod, work, q, stages)
     forward(rod, work, stages, momentum, v)
     for sweep in range(sweeps):
         mixed(base, a, v, h, q)
-        frame(rod, work, q, stages)
+        basis(rod, work, q, stages)
         for i in range(s):
             for row in range(3):
                 for k in range(n):

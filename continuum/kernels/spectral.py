@@ -18,7 +18,7 @@ def part(function):
 
 
 class Spectral(NamedTuple):
-    """Parameters. The matrices and weights are those of `continuum.bases.Basis`, for row vectors on their left.
+    """Parameters. The matrices and weights are those of `continuum.functions.Functions`, for row vectors on their left.
 
     bends : (n, n + 3 F). rates : (n, 3 F), back : (3 F, n). project : (F + n, n), pull : (n, F + n). bending : (n,).
     torsion : (n, n). twist : (n,), moment of the initial twist. mass, spin : (n,), w rho and w alpha. scale : (3,).
@@ -40,7 +40,7 @@ class Spectral(NamedTuple):
     rolling: Any
 
 
-class Frame(NamedTuple):
+class Basis(NamedTuple):
     """C. e : (s, n) and t : (s, n), 1/sqrt(w (alpha + rho |e|^2)), at the nodes. finer : (s, 3, F), e'', 2 e', e."""
 
     e: NDArray
@@ -60,9 +60,9 @@ class Work(NamedTuple):
 
 @part
 def blank(rod, s):
-    """A frame and the work of `s` stages."""
+    """A basis and the work of `s` stages."""
     n, finer = rod.bends.shape[0], rod.rates.shape[1]
-    c = Frame(np.empty((s, n), np.complex128), np.empty((s, n)), np.empty((s, 3, finer // 3), np.complex128))
+    c = Basis(np.empty((s, n), np.complex128), np.empty((s, n)), np.empty((s, 3, finer // 3), np.complex128))
     work = Work(
         np.empty((2 * s, n)),
         np.empty((2 * s, n + finer)),
@@ -74,7 +74,7 @@ def blank(rod, s):
 
 
 @part
-def frame(rod, work, q, c):
+def basis(rod, work, q, c):
     """C at configurations q (s, 3, n)."""
     s, _, n = q.shape
     points = c.finer.shape[2]

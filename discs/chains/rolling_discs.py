@@ -12,7 +12,7 @@ from discs.skew import Placed, SkewGradient
 
 
 class RollingDiscs(SkewGradient):
-    """The equations of motion of a chain. A frame is the entries of C, (rows, n).
+    """The equations of motion of a chain. A basis is the entries of C, (rows, n).
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class RollingDiscs(SkewGradient):
 
     @property
     @abstractmethod
-    def kernel(self) -> Any:
+    def parameters(self) -> Any:
         """The chain's parameters for the compiled methods of `discs.kernels`; None if it has no compiled form."""
 
     # The linear system of an implicit step

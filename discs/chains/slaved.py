@@ -79,7 +79,7 @@ class SlavedSystem(RollingDiscs):
         """Inertia m = w (alpha + rho |e|**2) of each disc against rolling, (n,)."""
         return self.weights[2] + self.weights[0] * (e[0] ** 2 + e[1] ** 2)
 
-    def frame(self, shape: NDArray) -> NDArray:
+    def basis(self, shape: NDArray) -> NDArray:
         c = np.empty((3, self.n), shape.dtype)
         c[:2] = self.contact(shape)
         c[2] = 1 / np.sqrt(self.inertia(c[:2]))
@@ -130,7 +130,7 @@ class SlavedSystem(RollingDiscs):
         return self._springs.stiffness(secant, c)
 
     @cached_property
-    def kernel(self) -> Any:
+    def parameters(self) -> Any:
         parts = [part.parameters for part in (self._law, self._springs, self.load) if part is not None]
         if None in parts:
             return None

@@ -109,7 +109,7 @@ class SteeredSystem(RollingDiscs):
     def contact_rate(self, shape: Links, v: NDArray) -> NDArray:
         return -self._radius * v[3] * self.slope(shape)
 
-    def frame(self, shape: Links) -> NDArray:
+    def basis(self, shape: Links) -> NDArray:
         c = np.empty((4, self.n))
         c[2:] = 1 / self._roots
         c[:2] = self.contact(shape) * c[2]
@@ -201,7 +201,7 @@ class SteeredSystem(RollingDiscs):
         return self._assembly((b, self._stiffness.T))
 
     @cached_property
-    def kernel(self) -> Any:
+    def parameters(self) -> Any:
         if self.load is not None and self.load.parameters is None:
             return None
         from discs.kernels import steered  # numba is slow to import

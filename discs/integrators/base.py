@@ -110,7 +110,7 @@ class Integrator(ABC):
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Any:
         """What the method must remember between steps of size h, at the first time.
 
-        `chain`, here and below, are the parameters for the compiled form, `system.kernel`; None for the plain one.
+        `chain`, here and below, are the parameters for the compiled form, `system.parameters`; None for the plain one.
         """
 
     @abstractmethod
@@ -178,7 +178,7 @@ class FixedStep(Integrator):
     def march(
         self, chain: Any, memory: Any, t: float, h: float, steps: int, bound: float, looks: Looks = NO_LOOKS
     ) -> tuple[Any, Tally]:
-        """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.kernel`.
+        """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.parameters`.
 
         Stops after a step whose kinetic energy is not below `bound`, and after one in which a disc loses its heading; the returned
         state is then undefined. Raises `Cut` on Ctrl-C, heard in every sweep, where Python's handler of it does not raise itself.
@@ -212,7 +212,7 @@ class OneStep(FixedStep):
     def at(self, system: RollingDiscs, memory: Phase, t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         if chain is None:
             z = self.step(system, memory, t, tau, work) if tau else memory
-            return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
+            return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi))
         import discs.kernels.driver as driver
 
         z, lost = memory, -1

@@ -156,9 +156,9 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
     )
     rule = method.tableau
     a, pi, s, stiff = rule.a, before.pi, rule.b.size, do.pick(chain, room.stiff, 0)
-    do.frame(chain, work, room.still, c)
+    do.basis(chain, work, room.still, c)
     renew(c, pi, 0.5 * h, move, chain.scale, room.change)
-    do.frame(chain, work, move, c)
+    do.basis(chain, work, move, c)
     do.stiffness(chain, work, move, c, stiff)
     for j in range(rule.real.size):
         do.precondition(chain, stiff, c, h * rule.real[j], h * h * rule.real[j] ** 2, do.pick(chain, room.single, j))
@@ -175,7 +175,7 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
         # C where the stages are, velocities by it, and forces where these lead
         for i in range(s):
             combine(a[i], v, h, move)
-            do.frame(chain, work, move, stages[i])
+            do.basis(chain, work, move, stages[i])
         for i in range(s):
             forward(stages[i], p[i], v[i])
         for i in range(s):

@@ -55,14 +55,14 @@ class Gauss(OneStep, ABC):
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         a, b, nodes, last, real, real_in, real_out, pairs, pairs_in, pairs_out = tableau(self.stages)
         shape = system.shape(z.hi, z.lo)
-        middle = system.moved(shape, 0.5 * h * system.forward(system.frame(shape), z.pi))
-        common = system.frame(middle)
+        middle = system.moved(shape, 0.5 * h * system.forward(system.basis(shape), z.pi))
+        common = system.basis(middle)
         secant = system.secant(middle, np.zeros_like(z.hi))
         parts = [*zip(real, real_in, real_out, strict=True), *zip(pairs, pairs_in, pairs_out, strict=True)]
         p = np.array([z.pi] * self.stages)
         v = np.array([system.forward(common, stage) for stage in p])
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
-            c = system.frames(shape, h * _mix(a, v))
+            c = system.bases(shape, h * _mix(a, v))
             force = system.pulls(c, shape, t + h * nodes, z, h * _mix(a, system.forwards(c, p)), p)
             rest = z.pi - p - h * _mix(a, force)
             change = np.zeros_like(p)

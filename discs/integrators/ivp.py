@@ -23,7 +23,7 @@ class Reduced:
     Parameters
     ----------
     system : the chain.
-    chain : `system.kernel` for the compiled form, None for the plain one.
+    chain : `system.parameters` for the compiled form, None for the plain one.
     """
 
     def __init__(self, system: RollingDiscs, chain: Any = None) -> None:
@@ -50,7 +50,7 @@ class Reduced:
             return out
         z = self.split(y)
         shape = self.system.shape(z.hi)
-        c = self.system.frame(shape)
+        c = self.system.basis(shape)
         return self.join(self.system.forward(c, z.pi), -self.system.pull(c, self.system.gradient(shape), t, z, 0.0, z.pi))
 
     @property
@@ -115,7 +115,7 @@ class SolveIvp(Integrator, ABC):
 
     def at(self, system: RollingDiscs, memory: "Course", t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
         z = memory.to(memory.time + tau, work) if tau else memory
-        return Frame(z.hi, z.lo, system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi))
+        return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi))
 
     def kinetic(self, system: RollingDiscs, memory: "Course", h: float) -> float:
         return 0.5 * float(np.vdot(memory.pi, memory.pi))

@@ -54,13 +54,13 @@ class Leapfrog(FixedStep):
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> TwoStep:
         first = RK4().step(system, z, 0.0, h, work)
         move = (first.hi - z.hi) + (first.lo - z.lo)
-        central = 2 * h * system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi)
+        central = 2 * h * system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi)
         return TwoStep(z.hi, z.lo, central - move, move)
 
     def advance(self, system: RollingDiscs, memory: TwoStep, t: float, h: float, work: Work) -> TwoStep:
         hi, lo = add(memory.hi, memory.lo, memory.next)
         shape = system.shape(hi, lo)
-        c = system.frame(shape)
+        c = system.basis(shape)
         free = 2 * system.weights * memory.next - h * h * system.gradient(shape)  # M (q* - q_{n-1})
         work.gradients += 1
         return TwoStep(hi, lo, memory.next, system.forward(c, system.back(c, free)) - memory.next)
@@ -79,7 +79,7 @@ class Leapfrog(FixedStep):
         return RK4().finer(system, self._phase(system, memory, (memory.last + memory.next) / (2 * h)), t, h, chain)
 
     def _phase(self, system: RollingDiscs, memory: TwoStep, rate: NDArray) -> Phase:
-        pi = system.back(system.frame(system.shape(memory.hi, memory.lo)), system.weights * rate)
+        pi = system.back(system.basis(system.shape(memory.hi, memory.lo)), system.weights * rate)
         return Phase(memory.hi, memory.lo, pi)
 
     def kinetic(self, system: RollingDiscs, memory: TwoStep, h: float) -> float:
@@ -126,7 +126,7 @@ def _step(method: Central, chain: Any, work: Any, room: Room, before: TwoStep, a
     c, still, g, p = room
     advance(before, before.next, 1.0, after)
     do.settle(chain, work, after.hi, after.lo)
-    do.frame(chain, work, still, c)
+    do.basis(chain, work, still, c)
     do.gradient(chain, work, still, g)
     for row in range(g.shape[0]):
         w, move, to = chain.weights[row], before.next[row], g[row]

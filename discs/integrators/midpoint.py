@@ -70,10 +70,10 @@ class Midpoint(OneStep):
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)
-        p, move = z.pi, 0.5 * h * system.forward(system.frame(shape), z.pi)
+        p, move = z.pi, 0.5 * h * system.forward(system.basis(shape), z.pi)
         guide: tuple[Any, Any] | None = None
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
-            c = system.frame(system.moved(shape, move))
+            c = system.basis(system.moved(shape, move))
             velocity = system.forward(c, p)
             secant = system.secant(shape, h * velocity)
             if guide is None or system.quadratic:
@@ -122,7 +122,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
     solves, unconverged = 0, 0
     for part in range(method.fractions.size):
         tau = method.fractions[part] * h
-        do.frame(chain, work, room.still, work.c)
+        do.basis(chain, work, room.still, work.c)
         copy(now.pi, p)
         renew(work.c, p, 0.5 * tau, move, chain.scale, room.change)
         sweep, change = 0, np.inf

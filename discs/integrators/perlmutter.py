@@ -51,13 +51,13 @@ class McLachlanPerlmutter(OneStep):
 
     def step(self, system: RollingDiscs, z: Phase, t: float, h: float, work: Work) -> Phase:
         shape = system.shape(z.hi, z.lo)
-        v = system.forward(system.frame(shape), z.pi)
+        v = system.forward(system.basis(shape), z.pi)
         half, move = 0.5 * h * v, h * v
         middle = system.moved(shape, half)
-        c = system.frame(middle)
+        c = system.basis(middle)
         pull = system.back(c, system.weights * v - h * system.gradient(middle))
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
-            after = system.frame(system.moved(shape, move))
+            after = system.basis(system.moved(shape, move))
             pi = pull / system.back(c, system.weights * system.forward(after, np.ones_like(pull)))
             last, move = move, half + 0.5 * h * system.forward(after, pi)
             if (np.abs(move - last).max(axis=1) <= self.tolerance * system.scale).all():
@@ -123,14 +123,14 @@ def _room(method: Swept, chain: Any, state: Phase) -> Room:
 @fill(do.step, Swept, forceinline=True)
 def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     c, end, still, half, move, v, g, pull, share, ones, change = room
-    do.frame(chain, work, still, c)
+    do.basis(chain, work, still, c)
     forward(c, before.pi, v)
     for row in range(v.shape[0]):
         rate, part, whole = v[row], half[row], move[row]
         for k in range(rate.size):
             part[k] = 0.5 * h * rate[k]
             whole[k] = 2 * part[k]
-    do.frame(chain, work, half, c)
+    do.basis(chain, work, half, c)
     do.gradient(chain, work, half, g)
     for row in range(v.shape[0]):
         w, rate, to = chain.weights[row], v[row], g[row]
@@ -142,7 +142,7 @@ def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after
         if interrupted():
             return CUT
         sweep += 1
-        do.frame(chain, work, move, end)
+        do.basis(chain, work, move, end)
         forward(end, ones, v)
         for row in range(v.shape[0]):
             w, to = chain.weights[row], v[row]

@@ -32,7 +32,7 @@ class RK4(OneStep):
 
         def rate(tau: float, dq: NDArray, dpi: NDArray) -> tuple[NDArray, NDArray]:
             moved, p = system.moved(shape, dq), z.pi + dpi
-            c = system.frame(moved)
+            c = system.basis(moved)
             return system.forward(c, p), -system.pull(c, system.gradient(moved), t + tau, z, dq, p)
 
         q1, p1 = rate(0.0, np.zeros_like(z.hi), np.zeros_like(z.pi))
@@ -79,7 +79,7 @@ def _step(method: Explicit, chain: Any, work: Any, room: Room, before: Phase, af
     move[:], total[:], kick[:] = 0.0, 0.0, 0.0
     copy(pi, p)
     for i in range(4):
-        do.frame(chain, work, move, c)
+        do.basis(chain, work, move, c)
         forward(c, p, v)
         do.pullback(chain, work, before, t + nodes[i] * h, move, c, p, g)
         for row in range(v.shape[0]):

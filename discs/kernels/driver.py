@@ -135,7 +135,7 @@ def observe(chain, hi, lo, v, q):
     """What `seen` returns at hi + lo and rates v."""
     work, c = do.workspace(chain), np.empty_like(hi)
     do.settle(chain, work, hi, lo)
-    do.frame(chain, work, np.zeros_like(hi), c)
+    do.basis(chain, work, np.zeros_like(hi), c)
     return seen(chain, work, c, hi, lo, v, q)
 
 
@@ -152,7 +152,7 @@ def reduced(chain, t, y, out):
         for row in range(columns(rows)):
             p[row, i] = y[width * i + rows + row]
     do.settle(chain, work, hi, still)
-    do.frame(chain, work, still, c)
+    do.basis(chain, work, still, c)
     forward(c, p, v)
     do.pullback(chain, work, Phase(hi, still, p), t, still, c, p, g)
     for i in range(n):

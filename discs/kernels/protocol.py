@@ -19,7 +19,7 @@ def settle(chain, work, hi, lo):
 
 
 @stub
-def frame(chain, work, move, c):
+def basis(chain, work, move, c):
     """c = C after a move from the base."""
 
 

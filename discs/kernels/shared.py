@@ -121,7 +121,7 @@ def _kinetic(state, chain, h):
 @fill(do.rate, Phase)
 def _rate(state, chain, work, c, tau, move):
     move[:] = 0.0
-    do.frame(chain, work, move, c)
+    do.basis(chain, work, move, c)
     forward(c, state.pi, move, tau)
 
 
@@ -129,7 +129,7 @@ def _rate(state, chain, work, c, tau, move):
 def _kick(before, after, chain, work, t, h, c, g, defect):
     do.settle(chain, work, before.hi, before.lo)
     defect[:] = 0.0
-    do.frame(chain, work, defect, c)
+    do.basis(chain, work, defect, c)
     do.pullback(chain, work, before, t, defect, c, before.pi, g)
     for row in range(c.shape[0]):
         a, pull, start, end, to = c[row], g[column(row)], before.pi[column(row)], after.pi[column(row)], defect[row]

@@ -117,7 +117,7 @@ def moved(chain, base, move, d, rows):
 
 
 @part
-def frame_of(chain, d, c):
+def basis_of(chain, d, c):
     """C of links, r' = (d_i + d_{i+1})/2k."""
     n = c.shape[1]
     dx, dy, cx, cy, ct = d[0], d[1], c[0], c[1], c[2]
@@ -129,10 +129,10 @@ def frame_of(chain, d, c):
         ct[i], cx[i], cy[i] = t, -y * (e * t), x * (e * t)
 
 
-@fill(do.frame, Slaved)
-def _frame(chain, work, move, c):
+@fill(do.basis, Slaved)
+def _basis(chain, work, move, c):
     moved(chain, work.base, move, work.links, 2)
-    frame_of(chain, work.links, c)
+    basis_of(chain, work.links, c)
 
 
 @fill(do.gradient, Slaved)
@@ -161,7 +161,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
     n = p.shape[1]
     c, q, b, m = work.c, p[0], work.rhs[0], work.matrix
     moved(chain, work.base, move, work.links, 2)
-    frame_of(chain, work.links, c)
+    basis_of(chain, work.links, c)
     half = 0.5 * h
     # links of the half step that this C makes
     for row in range(3):

@@ -127,7 +127,7 @@ def _settle(chain, work, hi, lo):
 
 
 @part
-def frame_of(chain, work, dphi, c):
+def basis_of(chain, work, dphi, c):
     """C after headings have turned by dphi."""
     cos, sin = work.angles[0], work.angles[1]
     cx, cy, ct, cp = c[0], c[1], c[2], c[3]
@@ -139,9 +139,9 @@ def frame_of(chain, work, dphi, c):
         ct[i], cp[i] = roll[i], heading[i]
 
 
-@fill(do.frame, Steered)
-def _frame(chain, work, move, c):
-    frame_of(chain, work, move[3], c)
+@fill(do.basis, Steered)
+def _basis(chain, work, move, c):
+    basis_of(chain, work, move[3], c)
 
 
 @fill(do.gradient, Steered)
@@ -168,7 +168,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
     n = p.shape[1]
     half = 0.5 * h
     c, b, m, pi = work.c, work.rhs, work.matrix, state.pi
-    frame_of(chain, work, move[3], c)
+    basis_of(chain, work, move[3], c)
     forward(c, p, work.step, half)
     pull(chain, work, work.step, True)
     pulled(work, c, b)

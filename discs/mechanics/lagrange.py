@@ -90,7 +90,7 @@ def frames(problem: Problem, run: Solution | None = None) -> tuple[Float, Float]
     system = problem.system
     if run is None:
         z = problem.start()
-        return z.hi.ravel(), system.forward(system.frame(system.shape(z.hi, z.lo)), z.pi).ravel()
+        return z.hi.ravel(), system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi).ravel()
     if run.x_rate is None:
         raise ValueError('velocities are needed; simulate with want=("velocity",)')
     q, v = (np.hstack([getattr(run, name) for name in names]) for names in (system.rows, system.rates))

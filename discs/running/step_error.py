@@ -113,14 +113,14 @@ class Watch:
         return float(np.maximum.reduce(np.add.reduce(seen[:, 0]) / size)) * SAFETY * (self.steps or 1) / self.passed
 
     def again(
-        self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: NDArray, h: float, kernel: Any
+        self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: NDArray, h: float, parameters: Any
     ) -> float | None:
         """The error by a run with half the step, at the places kept and at the `last` one; None if that run fails."""
-        done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), kernel)
+        done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
         size = self.defects[: self.passed, 1].max(axis=0)
         steps = [*self.looks.tolist(), self.steps] if self.steps else []
         for step, place in zip(steps, [*self.places, last], strict=True):
-            memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), kernel)
+            memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), parameters)
             if tally.lost >= 0 or not np.isfinite(memory.hi).all():
                 return None
             done, off = step, np.abs(memory.hi - place).max(axis=1)
@@ -129,26 +129,26 @@ class Watch:
 
 
 def advanced(
-    system: RollingDiscs, integrator: FixedStep, memory: Any, t: float, h: float, steps: int, kernel: Any
+    system: RollingDiscs, integrator: FixedStep, memory: Any, t: float, h: float, steps: int, parameters: Any
 ) -> tuple[Any, Tally]:
     """What the integrator remembers some steps later, and what they cost."""
-    if kernel is not None:
-        return integrator.march(kernel, memory, t, h, steps, np.inf)
+    if parameters is not None:
+        return integrator.march(parameters, memory, t, h, steps, np.inf)
     work = Work()
     for _ in range(steps):
         memory, t = integrator.advance(system, memory, t, h, work), t + h
     return memory, Tally(steps, work.gradients, work.solves, work.unconverged, -1, 0, False, False)
 
 
-def converging(system: RollingDiscs, integrator: FixedStep, before: Any, t: float, steps: int, h: float, kernel: Any) -> float:
+def converging(system: RollingDiscs, integrator: FixedStep, before: Any, t: float, steps: int, h: float, parameters: Any) -> float:
     """A step with which the first of `steps` steps that does not converge, from a state, would; h/2^HALVINGS if none was found."""
     for _ in range(steps):
-        after, tally = advanced(system, integrator, before, t, h, 1, kernel)
+        after, tally = advanced(system, integrator, before, t, h, 1, parameters)
         if tally.unconverged:
             break
         before, t = after, t + h
     for halving in range(1, HALVINGS + 1):
-        if not advanced(system, integrator, before, t, h / 2**halving, 2**halving, kernel)[1].unconverged:
+        if not advanced(system, integrator, before, t, h / 2**halving, 2**halving, parameters)[1].unconverged:
             break
     return h / 2**halving
 

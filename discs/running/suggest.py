@@ -38,7 +38,7 @@ def _stiffest(problem: Problem) -> float:
     """Largest eigenvalue of C^T S C at the initial state."""
     system, z = problem.system, problem.start()
     shape = system.shape(z.hi, z.lo)
-    c = system.frame(shape)
+    c = system.basis(shape)
 
     def apply(p: NDArray) -> NDArray:
         move = system.forward(c, p.reshape(z.pi.shape))

@@ -74,9 +74,9 @@ class March:
         self.problem, self.integrator, self.h, self.watch = problem, integrator, h, watch
         self.stuck: list[tuple[Any, float, int]] = []
         self.system, self.work, self.step = problem.system, Work(), 0
-        self.kernel = self.system.kernel if compiled else None
+        self.parameters = self.system.parameters if compiled else None
         fixed: Any = None if integrator.adaptive else integrator
-        self.twin: FixedStep | None = fixed if self.kernel is not None else None  # steps compiled
+        self.twin: FixedStep | None = fixed if self.parameters is not None else None  # steps compiled
         self.explicit = integrator.stability_limit < np.inf
         self.chunk = CHUNK // self.system.n or 1
         self.bound = problem.blown_up
@@ -84,13 +84,13 @@ class March:
             warn(problem.ill_posed)
         if integrator.stability_limit == np.inf and not integrator.adaptive:
             _warn_of_lost_digits(self.system, h)
-        self.memory: Any = integrator.begin(self.system, problem.start(), h, self.work, self.kernel)
-        if self.kernel is not None:
+        self.memory: Any = integrator.begin(self.system, problem.start(), h, self.work, self.parameters)
+        if self.parameters is not None:
             self._prepare(quiet)
 
     def _prepare(self, quiet: bool) -> None:
         """Have the kernels compiled: once for all runs on a machine, read from disc once in a process."""
-        key = (type(self.integrator), *map(type, self.kernel or ()))  # of the chain's laws and load too
+        key = (type(self.integrator), *map(type, self.parameters or ()))  # of the chain's laws and load too
         if key in _PREPARED:
             return
         from discs.kernels.compiled import compiling, uncached
@@ -102,8 +102,8 @@ class March:
 
         with compiling(say, NOTICE):
             if self.twin is not None:
-                self.twin.march(self.kernel, self.memory, 0.0, self.h, 0, self.bound)
-            self.observe(self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.kernel))
+                self.twin.march(self.parameters, self.memory, 0.0, self.h, 0, self.bound)
+            self.observe(self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
         _PREPARED.add(key)
 
     def keep(self) -> dict[str, Any]:
@@ -141,7 +141,7 @@ class March:
 
     def _compare(self, watch: Watch, before: Any) -> None:
         """Compare the step just taken with one of less error."""
-        finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.kernel)
+        finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.parameters)
         watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
 
     def step_error(self, rest: float) -> float:
@@ -150,13 +150,13 @@ class March:
         if watch is None:
             return 0.0
         if rest and not watch.steps:
-            memory = integrator.begin(self.system, self.problem.start(), rest, Work(), self.kernel)
-            finer = integrator.finer(self.system, memory, 0.0, rest, self.kernel)
-            one = integrator.at(self.system, memory, 0.0, rest, rest, Work(), self.kernel)
+            memory = integrator.begin(self.system, self.problem.start(), rest, Work(), self.parameters)
+            finer = integrator.finer(self.system, memory, 0.0, rest, self.parameters)
+            one = integrator.at(self.system, memory, 0.0, rest, rest, Work(), self.parameters)
             watch.compare(one.hi, one.hi if finer is None else finer)
         found = watch.estimate()
         if watch.short and SUSPECTED[0] < found < SUSPECTED[1] and not self.stuck and isinstance(integrator, FixedStep):
-            again = watch.again(self.system, self.problem.start(), integrator, self.memory.hi, self.h, self.kernel)
+            again = watch.again(self.system, self.problem.start(), integrator, self.memory.hi, self.h, self.parameters)
             return found if again is None else again
         return found
 
@@ -169,14 +169,14 @@ class March:
         """A step that converges where the run's did not, by the name that `stats` has for it; empty if it is not known."""
         if not self.stuck or not isinstance(self.integrator, FixedStep):
             return {}
-        tried = (converging(self.system, self.integrator, *place, self.h, self.kernel) for place in self.stuck)
+        tried = (converging(self.system, self.integrator, *place, self.h, self.parameters) for place in self.stuck)
         return {"converging_dt": min(tried)}
 
     def frame(self, tau: float) -> Frame:
         """The discs a time 0 <= tau < h after the last step; `Cut` where Ctrl-C was heard and did not raise."""
         stuck = self.work.unconverged
         try:
-            frame = self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, self.work, self.kernel)
+            frame = self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, self.work, self.parameters)
         except ArithmeticError as error:
             raise self._gave_up(error) from None
         if tau:
@@ -194,11 +194,11 @@ class March:
         system = self.system
         if frame.seen is not None:
             q, energy, slip = frame.seen
-        elif self.kernel is not None:
+        elif self.parameters is not None:
             import discs.kernels.driver as driver
 
             q = np.empty_like(frame.hi)
-            energy, slip = driver.observe(self.kernel, frame.hi, frame.lo, frame.rate, q)
+            energy, slip = driver.observe(self.parameters, frame.hi, frame.lo, frame.rate, q)
         else:
             shape = system.shape(frame.hi, frame.lo)
             q, energy = frame.hi + frame.lo, system.kinetic(frame.rate) + system.potential(shape)
@@ -238,10 +238,10 @@ class March:
         previous, watch, looks = self.memory, self.watch, NO_LOOKS
         if watch is not None:
             steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
-        self.memory, tally = twin.march(self.kernel, previous, self.step * self.h, self.h, steps, self.bound, looks)
+        self.memory, tally = twin.march(self.parameters, previous, self.step * self.h, self.h, steps, self.bound, looks)
         self.work.add(tally)
         if tally.lost >= 0:
-            previous, _ = twin.march(self.kernel, previous, self.step * self.h, self.h, tally.steps - 1, self.bound)
+            previous, _ = twin.march(self.parameters, previous, self.step * self.h, self.h, tally.steps - 1, self.bound)
         if tally.lost >= 0 or tally.blown:
             self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
         if watch is not None:

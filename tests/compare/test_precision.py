@@ -124,7 +124,7 @@ def test_times_at_equal_error():
 
 def scipy_alone(problem: Problem) -> list[Peer]:
     """SciPy's methods with the kernel that every chain shares, where peers have one compiled for theirs, which takes seconds."""
-    chain = problem.system.kernel
+    chain = problem.system.parameters
     return reduced.scipy_peers(problem, reduced.Bound(problem, lambda t, y, out: driver.reduced(chain, t, y, out)))
 
 

@@ -71,7 +71,7 @@ def test_all_of_the_momentum_is_there():
     width = 0.01
     for place in (1.0, 2.13, 3.9):
         rod = SpectralRod(scene(omega=bump(width, place)), 19)
-        momentum = rod.start.pi @ (rod.basis.w * 2 * rod.frame(rod.start.hi).t)
+        momentum = rod.start.pi @ (rod.functions.w * 2 * rod.basis(rod.start.hi).t)
         assert momentum == pytest.approx(2 * width * np.sqrt(np.pi), rel=1e-6)
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from continuum import Rod, Scene, breathing_ring, collocation, exact, rolling_rod, solve, untwisting_rod
-from continuum.bases import polynomials, waves
 from continuum.density import Density
+from continuum.functions import polynomials, waves
 from continuum.galerkin import SpectralRod
 from continuum.kernels.collocation import step as compiled_step
 from continuum.scenes import PAPER
@@ -67,9 +67,9 @@ def followed(scene, n, steps):
     rod = SpectralRod(scene, n)
     z = Phase(*(part.copy() for part in rod.start))
     for _ in range(steps):
-        modes = rod.modes(rod.frame(z.hi + z.lo))
+        modes = rod.modes(rod.basis(z.hi + z.lo))
         assert compiled_step(
-            rod.kernel, *z, modes, tableau(4), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)), np.empty((4, n))
+            rod.parameters, *z, modes, tableau(4), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)), np.empty((4, n))
         )
     return rod, z
 
@@ -93,13 +93,13 @@ def test_skew_gradient_and_energy(name, scene):
     z = rod.start
     rng = np.random.default_rng(4)
     q = z.hi + 0.01 * rng.standard_normal(z.hi.shape) / (1 + np.arange(21)) ** 4
-    c, p, g = rod.frame(q), rng.standard_normal(21), rng.standard_normal((3, 21))
+    c, p, g = rod.basis(q), rng.standard_normal(21), rng.standard_normal((3, 21))
     assert np.vdot(g, rod.forward(c, p)) == pytest.approx(rod.back(c, g) @ p, rel=1e-10)
     step = 1e-6 * rng.standard_normal(q.shape)
     change = rod.potential(q + step) - rod.potential(q - step)
     assert change == pytest.approx(2 * np.vdot(rod.gradient(q), step), rel=1e-6, abs=1e-12)
     moves = 1e-3 * rng.standard_normal((3, *q.shape)) / (1 + np.arange(21)) ** 4
-    several, one = rod.frames(q, moves), [rod.frame(q + move) for move in moves]
+    several, one = rod.bases(q, moves), [rod.basis(q + move) for move in moves]
     ps = rng.standard_normal((3, 21))
     np.testing.assert_allclose(rod.forwards(several, ps), [rod.forward(*pair) for pair in zip(one, ps, strict=True)], atol=1e-11)
     stiff = np.array([rod.back(c, rod.gradient(rod.forward(c, unit)) - rod.gradient(np.zeros_like(q))) for unit in np.eye(21)])
@@ -116,12 +116,12 @@ def test_skew_gradient_and_energy(name, scene):
 def test_twins_agree(name, scene):
     """Compiled steps and plain ones, of several numbers of stages: states, rates of the stages and sweeps."""
     rod = SpectralRod(scene, 21)
-    modes = rod.modes(rod.frame(rod.start.hi))
+    modes = rod.modes(rod.basis(rod.start.hi))
     for stages in (4, 6):
         z = Phase(*(part.copy() for part in rod.start))
         plain, v, p = rod.start, np.empty((stages, 3, 21)), np.empty((stages, 21))
         for _ in range(2):
-            sweeps = compiled_step(rod.kernel, *z, modes, tableau(stages), scene.duration / 5, 40, 1e-12, v, p)
+            sweeps = compiled_step(rod.parameters, *z, modes, tableau(stages), scene.duration / 5, 40, 1e-12, v, p)
             begun = plain
             plain, rates, momenta, count = collocation.step(rod, plain, modes, scene.duration / 5, stages, 40, 1e-12)
             assert count == sweeps > 1

@@ -57,7 +57,7 @@ def test_twins_agree(name, model):
 @models(COMPILED)
 def test_reduced_equations_agree_and_stay_within_their_sparsity(model):
     problem = uneven(9, model)
-    plain, compiled = Reduced(problem.system), Reduced(problem.system, problem.system.kernel)
+    plain, compiled = Reduced(problem.system), Reduced(problem.system, problem.system.parameters)
     z = problem.start()
     y = plain.join(z.hi, z.pi)
     np.testing.assert_array_equal(plain.split(y).hi, z.hi)

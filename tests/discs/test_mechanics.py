@@ -31,7 +31,7 @@ def skew_gradient(problem: Problem) -> np.ndarray:
     """Accelerations from pi. = -C^T grad V: with pi = root u, root. = w rho e.e./root, u. = (pi. - root. u)/root."""
     system, z = problem.system, problem.start()
     shape = system.shape(z.hi)
-    c = system.frame(shape)
+    c = system.basis(shape)
     v = system.forward(c, z.pi)
     e, turned = system.contact(shape), system.contact_rate(shape, v)
     root = system.momentum(shape, np.ones((2, N))).reshape(-1, N)

@@ -25,7 +25,7 @@ class Heun(OneStep):
     def step(self, system, z, t, h, work):
         def rate(dq, dpi):
             shape = system.moved(system.shape(z.hi, z.lo), dq)
-            c = system.frame(shape)
+            c = system.basis(shape)
             return system.forward(c, z.pi + dpi), -system.pull(c, system.gradient(shape), t, z, dq, z.pi + dpi)
 
         work.gradients += 2

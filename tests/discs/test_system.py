@@ -118,7 +118,7 @@ def test_skew_gradient_form_is_lagrange_d_alembert(model, sign):
     def roots(q):
         return system.momentum(system.shape(q), np.ones((2, n))).reshape(-1, n)
 
-    force = -system.back(system.frame(shape), system.gradient(shape)).reshape(-1, n)
+    force = -system.back(system.basis(shape), system.gradient(shape)).reshape(-1, n)
     reduced = (force - directional(roots, z.hi, velocity) * rates) / roots(z.hi)
     difference = np.abs(acceleration - reduced.ravel()).max() / np.abs(reduced).max()
     if sign == 1:
@@ -166,7 +166,7 @@ def test_energy_is_constant_along_the_flow(model):
     """dH/dt by differences of |pi|^2/2 + V along (q., pi.), V from its definition."""
     problem = uneven(N, model)
     system, z, shape = quantities(problem)
-    c = system.frame(shape)
+    c = system.basis(shape)
     q_rate, pi_rate = system.forward(c, z.pi), -system.back(c, system.gradient(shape))
     power = directional(lambda q: potential_from_the_definition(problem, q), z.hi, q_rate) + np.vdot(z.pi, pi_rate)
     assert abs(power) < 1e-8 * np.abs(z.pi * pi_rate).sum()
@@ -175,7 +175,7 @@ def test_energy_is_constant_along_the_flow(model):
 @models(ALL)
 def test_columns_of_c_are_orthonormal_and_admissible(model):
     system, z, shape = quantities(uneven(N, model))
-    c = system.frame(shape)
+    c = system.basis(shape)
     p = np.random.default_rng(5).standard_normal(z.pi.shape)
     v = system.forward(c, p)
     np.testing.assert_allclose(system.back(c, system.weights * v), p, rtol=1e-13)
@@ -188,7 +188,7 @@ def test_banded_solve_is_the_dense_one(model, n):
     """(I + h^2/4 C^T B^T (stiffness) B C) p = pi, with the strains' Jacobian B by differences."""
     problem = uneven(n, model)
     system, z, shape = quantities(problem)
-    c, h = system.frame(shape), 0.3
+    c, h = system.basis(shape), 0.3
     stiffness = np.array([s for s, _ in strains(problem, z.hi)])
 
     def strain(q):
@@ -209,4 +209,4 @@ def test_springs_without_stiffness_are_not_assembled():
     loose = Problem(type(chain)(**parameters | {"bending_stiffness": 0.0}), problem.initial, 1.0)
     for p, bands in ((problem, 4), (loose, 2)):
         system, _, shape = quantities(p)
-        assert len(system.stiffness(shape, system.frame(shape))) == bands
+        assert len(system.stiffness(shape, system.basis(shape))) == bands

@@ -236,7 +236,7 @@ def test_random_problems_are_within_their_tolerance(seed):
     """No failure, no error above the tolerance; the reference is of another kind, or of steps eight times shorter."""
     problem, tol = problem_of(seed)
     run = simulate(problem, "auto", tol=tol, frames=4, progress=False)
-    small = problem.chain.n <= 12 and problem.system.kernel is not None
+    small = problem.chain.n <= 12 and problem.system.parameters is not None
     if small:
         exact = simulate(problem, DOP853(rtol=1e-11, atol=1e-13), problem.duration, run.t, progress=False)
     else:

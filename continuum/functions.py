@@ -14,7 +14,7 @@ from continuum.elements import lobatto
 FINER = 1.5  # points a node: products of three polynomials are integrated exactly
 
 
-class Basis(NamedTuple):
+class Functions(NamedTuple):
     """n functions of s, for the line by coefficients, for roll and its rate by values at nodes.
 
     s, w : (n,), nodes and the lengths they stand for.
@@ -52,7 +52,7 @@ def smooth(order: NDArray) -> NDArray:
 
 
 @lru_cache(maxsize=16)
-def polynomials(n: int, density: Density) -> Basis:
+def polynomials(n: int, density: Density) -> Functions:
     """Polynomials of degree n - 1 in the density's coordinate xi, between free ends.
 
     Coefficients of r are its values at the ends, then those of r'' in polynomials in xi that are orthonormal in s. They are
@@ -101,7 +101,7 @@ def polynomials(n: int, density: Density) -> Basis:
     project[0, fine.size] = project[1, -1] = 1
     project[2:, : fine.size] = (bend * wf[:, None]).T
     rates = [field(there, m) for m in range(3)]
-    return Basis(
+    return Functions(
         s=s,
         w=w / density.rate(s),
         bends=np.vstack([slope(x), slope(fine), *curved]) * smooth(np.concatenate([[0, 0], np.arange(n - 2) / (n - 3)])),
@@ -116,7 +116,7 @@ def polynomials(n: int, density: Density) -> Basis:
 
 
 @lru_cache(maxsize=16)
-def waves(n: int, density: Density) -> Basis:
+def waves(n: int, density: Density) -> Functions:
     """The first n (odd) of 1, cos, sin, ... on a closed rod; coefficients of r are those of the series."""
     length = density.length
     q = 2 * np.pi / length * np.repeat(np.arange(1, n // 2 + 1), 2)
@@ -134,7 +134,7 @@ def waves(n: int, density: Density) -> Basis:
     project[0, count:] = 1 / n
     project[1:, :count] = -(value(fine)[:, 1:] * (length / count)).T / (q**2 * square)[:, None]
     twist = value(fine, 1) @ fit
-    return Basis(
+    return Functions(
         s=s,
         w=np.full(n, length / n),
         bends=np.vstack([value(s, 1), *(value(fine, m) for m in (1, 2, 3))]) * smooth(np.concatenate([[0], q / q[-1]])),
