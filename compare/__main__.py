@@ -66,6 +66,9 @@ def add_trust(p: argparse.ArgumentParser) -> None:
     """The options of `trust`."""
     p.add_argument("--out", metavar="DIR", default="out", help="folder for trust.md and trust.csv (default: out)")
     p.add_argument("--scenes", metavar="M", type=int, default=200, help="number of scenes, of alternating kinds (default: 200)")
+    p.add_argument(
+        "--problems", metavar="M", type=int, help="so many random problems of discs, to tolerances by simulate, instead of scenes"
+    )
     p.add_argument("--seed", metavar="SEED", type=int, default=0, help="seed of scenes and tolerances (default: 0)")
     p.add_argument("--first", metavar="I", type=int, default=0, help="number of the first scene (default: 0)")
     p.add_argument(
