@@ -81,7 +81,7 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: NDArray, pro
                 raise ValueError(missed(error, bound, f"on {found.n} nodes") + _corners(scene))
     return Solution(
         t=times,
-        s=scene.rod.length / places * np.arange(values.shape[-1]),
+        s=scene.rod.length / places * np.arange(values.shape[-1], dtype=float),
         energy=np.array([found.energy(q) for q in runs[0].q]),
         stats={"method": "elements", "order": DEGREE, "elements": found.count, "nodes": found.n},
         error_estimate=error,

@@ -103,7 +103,7 @@ class Course:
         nodes = NODES - 1
         while nodes < MOST_NODES and length / nodes > narrowest / 4:
             nodes *= 2
-        self.s = length / nodes * np.arange(nodes + (not scene.closed))
+        self.s = length / nodes * np.arange(nodes + (not scene.closed), dtype=float)
         self._density = Density.of(initial)
         self._first = scene.duration / 16  # step to begin with
 

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Bool, Float
 from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import stretching
 from discs.chains.rolling_discs import RollingDiscs
@@ -81,7 +81,7 @@ class Problem:
         else:
             self._check_inertia(np.asarray(self.chain.radius) > 0, "radius = 0")
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Problems are sent to other processes as what they were made from."""
         return Problem, (self.chain, self.initial, self.duration, self.loads)
 
@@ -108,7 +108,7 @@ class Problem:
             raise ValueError(f"curvature={chain.curvature!r} needs links with a direction: discs {i} and {i + 1} are in one place")
         self._check_inertia((slope > 0) & (np.asarray(chain.radius) > 0), "r' = 0 or radius = 0")
 
-    def _check_inertia(self, moves: NDArray, where: str) -> None:
+    def _check_inertia(self, moves: Bool, where: str) -> None:
         """Refuse discs that neither move when they roll nor have a moment of inertia."""
         inertia = np.asarray(self.chain.spin_inertia) + moves
         if not inertia.all():
@@ -121,7 +121,7 @@ class Problem:
         load = total(self.loads)
         return SteeredSystem(self.chain, load) if isinstance(self.chain, SteeredChain) else SlavedSystem(self.chain, load)
 
-    def _positions(self) -> NDArray:
+    def _positions(self) -> Float:
         return np.array([getattr(self.initial, name) for name in self.system.rows])
 
     def start(self) -> Phase:
@@ -143,7 +143,8 @@ class Problem:
         if self.loads:
             return np.inf
         chain = self.chain
-        return 10 * self.energy() + 1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length
+        stiffest = np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)
+        return float(10 * self.energy() + 1e-16 * stiffest / chain.length)
 
     @cached_property
     def ill_posed(self) -> str:

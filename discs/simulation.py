@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.integrators import Integrator, find, from_settings
 from discs.integrators.base import Cut
 from discs.problem import Problem
@@ -26,6 +27,7 @@ from discs.warn import warn
 
 MOST_STEPS = 2.0**53
 ENGINES = ("compiled", "plain")
+Result = TypeVar("Result")
 LOST = 0.01  # of the energy: a run is warned of
 
 
@@ -114,7 +116,7 @@ def _search(
 ) -> tuple[Solution, str]:
     """A run to a tolerance, and what to warn of. Arguments as of `simulate`."""
 
-    def run(problem: Problem, integrator: Integrator, dt: float, times: NDArray) -> Solution:
+    def run(problem: Problem, integrator: Integrator, dt: float, times: Float) -> Solution:
         return _run(problem, integrator, dt, times, want, progress, engine, None, False)
 
     want = wanted(want, () if method == "auto" else find(method).offers)
@@ -137,7 +139,7 @@ def _search(
     return found, doubt
 
 
-def lost_energy(problem: Problem, method: str, t: NDArray, energy: NDArray) -> str:
+def lost_energy(problem: Problem, method: str, t: Float, energy: Float) -> str:
     """What to warn of where energies (F,) at times (F,) say that a run is not the motion it should be; empty where it may be."""
     off = np.abs(energy - problem.energy())
     worst = int(off.argmax())
@@ -220,13 +222,14 @@ def _run(
         told["unconverged"] = work.unconverged
         if work.unconverged:
             short = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
-            told |= {"short_steps": short} | _uncut(march.remedy, record, times.size, march)
+            told["short_steps"] = short
+            told |= _uncut(march.remedy, record, times.size, march)
         if watch is not None:
             told["step_error"] = _uncut(partial(march.step_error, rest), record, times.size, march)
         return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started}, march)
 
 
-def _uncut(call: Callable[[], Any], record: Rows, f: int, march: March) -> Any:
+def _uncut(call: Callable[[], Result], record: Rows, f: int, march: March) -> Result:
     """What a call returns; where Ctrl-C cuts it short, and does not raise, it is made again unless the run ends before frame f."""
     while True:
         try:

@@ -15,20 +15,27 @@ secant matrix B, then D = B^T (stiffness) (s_0 + s_1)/2 is one.
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, final
+from typing import Any, NamedTuple, Protocol, TypeAlias, final
 
 import numpy as np
-from numpy.typing import NDArray
+
+from discs.arrays import Float
+
+# Each system has its own: integrators only hand them on
+Shape: TypeAlias = Any
+Basis: TypeAlias = Any
+Secant: TypeAlias = Any
+Parameters: TypeAlias = Any  # a NamedTuple for compiled code; None if there is no compiled form
 
 
 class Placed(Protocol):
     """What has positions hi + lo, (rows, n)."""
 
     @property
-    def hi(self) -> NDArray: ...
+    def hi(self) -> Float: ...
 
     @property
-    def lo(self) -> NDArray: ...
+    def lo(self) -> Float: ...
 
 
 class Phase(NamedTuple):
@@ -38,12 +45,12 @@ class Phase(NamedTuple):
     pi : (n,), or (2, n) with own headings, rates along the columns of C.
     """
 
-    hi: NDArray
-    lo: NDArray
-    pi: NDArray
+    hi: Float
+    lo: Float
+    pi: Float
 
 
-def add(hi: NDArray, lo: NDArray, increment: NDArray) -> tuple[NDArray, NDArray]:
+def add(hi: Float, lo: Float, increment: Float) -> tuple[Float, Float]:
     """Add an increment to hi + lo without losing its low digits (Knuth's two-sum)."""
     term = increment + lo
     total = hi + term
@@ -61,15 +68,15 @@ class Load(ABC):
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
     """
 
-    damping: Any
-    stiffness: Any
+    damping: Float
+    stiffness: Float
 
     @abstractmethod
-    def force(self, t: float, q: NDArray, v: NDArray) -> NDArray:
+    def force(self, t: float, q: Float, v: Float) -> Float:
         """f at a time, of positions and velocities (rows, n), (rows, n)."""
 
     @property
-    def parameters(self) -> Any:
+    def parameters(self) -> Parameters:
         return None
 
 
@@ -87,51 +94,51 @@ class SkewGradient(ABC):
 
     n: int
     rows: tuple[str, ...]
-    scale: NDArray
+    scale: Float
     quadratic: bool
     load: Load | None = None
 
     @abstractmethod
-    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Any:
+    def shape(self, hi: Float, lo: Float | None = None) -> Shape:
         """The shape of positions hi + lo: what C and V depend on."""
 
     @abstractmethod
-    def moved(self, shape: Any, dq: NDArray) -> Any:
+    def moved(self, shape: Shape, dq: Float) -> Shape:
         """The shape after a change dq (rows, n) of the positions."""
 
     @abstractmethod
-    def basis(self, shape: Any) -> Any:
+    def basis(self, shape: Shape) -> Basis:
         """C, as `forward`, `back` and `solve` take it."""
 
     @abstractmethod
-    def forward(self, c: Any, p: NDArray) -> NDArray:
+    def forward(self, c: Basis, p: Float) -> Float:
         """C p, (rows, n)."""
 
     @abstractmethod
-    def back(self, c: Any, g: NDArray) -> NDArray:
+    def back(self, c: Basis, g: Float) -> Float:
         """C^T g, of the shape of pi."""
 
     @abstractmethod
-    def potential(self, shape: Any) -> float:
+    def potential(self, shape: Shape) -> float:
         """V."""
 
     @abstractmethod
-    def secant(self, shape: Any, dq: NDArray) -> Any:
+    def secant(self, shape: Shape, dq: Float) -> Secant:
         """What depends on a step dq (rows, n) from a shape: the mean geometry that `mean_force` and `solve` need."""
 
     @abstractmethod
-    def mean_force(self, secant: Any) -> NDArray:
+    def mean_force(self, secant: Secant) -> Float:
         """The discrete gradient of V over the step, (rows, n); grad V if the step is zero."""
 
     @abstractmethod
-    def solve(self, secant: Any, c: Any, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
+    def solve(self, secant: Secant, c: Basis, g: complex, rhs: Float, d: complex = 0.0) -> Float:
         """Solve (I + d C^T D C + g C^T S C) p = rhs for p, of the shape of pi.
 
         S = B^T (stiffness) B and the load's stiffness, D its damping.
         """
 
     @final
-    def pull(self, c: Any, gradient: NDArray, t: float, z: Phase, move: NDArray | float, p: NDArray) -> NDArray:
+    def pull(self, c: Basis, gradient: Float, t: float, z: Phase, move: Float | float, p: Float) -> Float:
         """C^T (gradient - f), of the shape of pi: minus the rate of pi.
 
         f is taken at the time t, at the positions of z after a move (rows, n), with velocities C p.
@@ -140,25 +147,25 @@ class SkewGradient(ABC):
             return self.back(c, gradient)
         return self.back(c, gradient - self.load.force(t, z.hi + (z.lo + move), self.forward(c, p)))
 
-    def gradient(self, shape: Any) -> NDArray:
+    def gradient(self, shape: Shape) -> Float:
         """grad V, (rows, n)."""
         return self.mean_force(self.secant(shape, self._no_step))
 
     @cached_property
-    def _no_step(self) -> NDArray:
+    def _no_step(self) -> Float:
         return np.zeros((len(self.rows), self.n))
 
     # Several configurations, the stages of a step; here one after the other, a system may take them at once
 
-    def bases(self, shape: Any, moves: NDArray) -> Any:
+    def bases(self, shape: Shape, moves: Float) -> Basis:
         """C after each of `moves` (stages, rows, n)."""
         return [self.basis(self.moved(shape, move)) for move in moves]
 
-    def forwards(self, bases: Any, p: NDArray) -> NDArray:
+    def forwards(self, bases: Basis, p: Float) -> Float:
         """C p of each, (stages, rows, n)."""
         return np.array([self.forward(c, stage) for c, stage in zip(bases, p, strict=True)])
 
-    def pulls(self, bases: Any, shape: Any, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
+    def pulls(self, bases: Basis, shape: Shape, t: Float, z: Phase, moves: Float, p: Float) -> Float:
         """C^T (grad V - f) at times t (stages,), after each of `moves` from z, of the shape of p."""
         stages = zip(bases, t, moves, p, strict=True)
         return np.array([self.pull(c, self.gradient(self.moved(shape, m)), time, z, m, own) for c, time, m, own in stages])

@@ -3,15 +3,15 @@
 It plots, views and saves itself: pictures and files stand above this module, and are imported when one of these methods is called.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.problem import Problem, State
 from discs.running.stats import Stats
 from discs.running.step_error import doubts
@@ -52,24 +52,24 @@ class Solution:
     error_estimate : for a field, {"x", "y", "theta", "omega"} -> estimated largest error over nodes and frames.
     """
 
-    t: NDArray
-    s: NDArray
-    x: NDArray
-    y: NDArray
-    theta: NDArray
-    omega: NDArray
-    energy: NDArray
-    rolling_residual: NDArray | None = None
+    t: Float
+    s: Float
+    x: Float
+    y: Float
+    theta: Float
+    omega: Float
+    energy: Float
+    rolling_residual: Float | None = None
     stats: Stats = field(default_factory=Stats)
-    phi: NDArray | None = None
-    x_rate: NDArray | None = None
-    phi_rate: NDArray | None = None
-    y_rate: NDArray | None = None
-    slope_x: NDArray | None = None
-    slope_y: NDArray | None = None
-    contact_force: NDArray | None = None
-    tension: NDArray | None = None
-    modified_energy: NDArray | None = None
+    phi: Float | None = None
+    x_rate: Float | None = None
+    phi_rate: Float | None = None
+    y_rate: Float | None = None
+    slope_x: Float | None = None
+    slope_y: Float | None = None
+    contact_force: Float | None = None
+    tension: Float | None = None
+    modified_energy: Float | None = None
     error_estimate: dict[str, float] | None = None
     problem: Problem | None = None
 
@@ -82,7 +82,7 @@ class Solution:
             f"{''.join(f'; {doubt}' for doubt in doubts(self.stats))})"
         )
 
-    def __getitem__(self, frames: slice | NDArray | Sequence[int]) -> "Solution":
+    def __getitem__(self, frames: slice | Float | Sequence[int]) -> "Solution":
         """The run at some of its frames, in order of time: a slice, a mask (F,) or numbers of frames."""
         try:
             picked = np.arange(self.t.size)[frames]
@@ -131,7 +131,7 @@ class Solution:
             )
         return State(self.x[i], self.y[i], self.theta[i], self.omega[i], self.phi[i], self.phi_rate[i])
 
-    def plot(self, *panels: str, ax: Any = None) -> "list[Axes]":
+    def plot(self, *panels: str, ax: "Axes | Iterable[Axes] | None" = None) -> "list[Axes]":
         """A first look at the run: all panels, or those named; see `discs.pictures.figures.first_look`."""
         from discs.pictures import figures
 

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.chains import links, stencils
 from discs.chains.rolling import ROLLING, RollingLaw
 
@@ -32,12 +33,13 @@ class Spaced:
         return stencils.spacing(self.n, self.length, self.ends)
 
     @property
-    def s(self) -> NDArray:
+    def s(self) -> Float:
         """Places of the discs along the rod, (n,)."""
-        return self.k * np.arange(self.n)
+        s: Float = self.k * np.arange(self.n, dtype=float)
+        return s
 
     @property
-    def w(self) -> NDArray:
+    def w(self) -> Float:
         """Length each disc stands for, (n,)."""
         return stencils.shares(self.n, self.k, self.ends)
 
@@ -120,7 +122,7 @@ class Chain(Spaced):
         return links.CURVATURE[self.curvature]
 
     @property
-    def bend_shares(self) -> NDArray:
+    def bend_shares(self) -> Float:
         """Length each bend stands for, (n_bends,)."""
         return stencils.bend_shares(self.n, self.k, self._bend_ends)
 

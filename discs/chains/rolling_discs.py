@@ -2,13 +2,12 @@
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
 
-from discs.skew import Placed, SkewGradient
+from discs.arrays import Float, Int
+from discs.skew import Parameters, Placed, Secant, Shape, SkewGradient
 
 
 class RollingDiscs(SkewGradient):
@@ -24,7 +23,7 @@ class RollingDiscs(SkewGradient):
     stiffest : bound of the entries of C^T (grad^2 V) C, per time squared.
     """
 
-    weights: NDArray
+    weights: Float
     closed: bool
     reach: int
     vanishing: bool
@@ -38,40 +37,40 @@ class RollingDiscs(SkewGradient):
     # Kinematics
 
     @abstractmethod
-    def slope(self, shape: Any) -> NDArray:
+    def slope(self, shape: Shape) -> Float:
         """The headings: the slope r' of the centre line (slaved), or (cos phi, sin phi); (2, n)."""
 
     @abstractmethod
-    def contact(self, shape: Any) -> NDArray:
+    def contact(self, shape: Shape) -> Float:
         """Contact directions e, (2, n): a disc moves by e per unit of roll. Length per rad."""
 
     @abstractmethod
-    def contact_rate(self, shape: Any, v: NDArray) -> NDArray:
+    def contact_rate(self, shape: Shape, v: Float) -> Float:
         """Rates of the contact directions, e., (2, n), for rates v (rows, n) of the coordinates. Length per time."""
 
     @abstractmethod
-    def momentum(self, shape: Any, rates: NDArray) -> NDArray:
+    def momentum(self, shape: Shape, rates: Float) -> Float:
         """pi of the rates of roll (row 0) and, with own headings, of turning (row 1)."""
 
     @abstractmethod
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
         """A disc whose heading vanished between two configurations, or None."""
 
-    def kinetic(self, v: NDArray) -> float:
+    def kinetic(self, v: Float) -> float:
         """Kinetic energy of rates (rows, n)."""
         return 0.5 * float(np.vdot(v, self.weights * v))
 
     # Springs
 
     @abstractmethod
-    def stiffness(self, secant: Any, c: NDArray) -> NDArray:
+    def stiffness(self, secant: Secant, c: Float) -> Float:
         """Upper bands (width + 1, unknowns) of C^T B^T (stiffness) B C, as LAPACK stores them, unknowns in `order`."""
 
     @abstractmethod
-    def polarised(self, shape: Any, other: Any) -> float:
+    def polarised(self, shape: Shape, other: Shape) -> float:
         """The symmetric bilinear form of which V is the square; ValueError unless V is quadratic."""
 
-    def contact_force(self, shape: Any, v: NDArray, f: NDArray | float = 0.0) -> NDArray:
+    def contact_force(self, shape: Shape, v: Float, f: Float | float = 0.0) -> Float:
         """Force lambda of the ground on each disc, (2, n), for admissible rates v (rows, n) and loads f (rows, n).
 
         With g = grad V - f, from rho w r.. = -g_r + lambda with r.. = e omega. + e. omega, and
@@ -81,25 +80,26 @@ class RollingDiscs(SkewGradient):
         e, turning = self.contact(shape), self.contact_rate(shape, v)
         inertia = self.weights[2] + mass * (e * e).sum(axis=0)
         torque = -(e * gradient[:2]).sum(axis=0) - gradient[2] - mass * omega * (e * turning).sum(axis=0)
-        return mass * (e * (torque / inertia) + turning * omega) + gradient[:2]
+        found: Float = mass * (e * (torque / inertia) + turning * omega) + gradient[:2]
+        return found
 
     @property
     @abstractmethod
-    def parameters(self) -> Any:
+    def parameters(self) -> Parameters:
         """The chain's parameters for the compiled methods of `discs.kernels`; None if it has no compiled form."""
 
     # The linear system of an implicit step
 
     @property
     @abstractmethod
-    def order(self) -> NDArray | None:
+    def order(self) -> Int | None:
         """Order in which the unknowns of pi are taken in banded systems; None as they stand."""
 
     @cached_property
-    def _inverse_order(self) -> NDArray | None:
+    def _inverse_order(self) -> Int | None:
         return None if self.order is None else np.argsort(self.order)
 
-    def solve(self, secant: Any, c: NDArray, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
+    def solve(self, secant: Secant, c: Float, g: complex, rhs: Float, d: complex = 0.0) -> Float:
         """In O(n): for g > 0 by banded Cholesky, for a complex g by banded elimination. In double precision whatever that of
         `rhs`, which is enough for a correction: a state in `longdouble` is carried on in extended precision.
         """
@@ -123,7 +123,8 @@ class RollingDiscs(SkewGradient):
             p = np.full(flat.size, np.nan)  # not positive definite: C is not finite, or all digits are lost
         if self._inverse_order is not None:
             p = p[self._inverse_order]
-        return p.reshape(rhs.shape)
+        found: Float = p.reshape(rhs.shape)
+        return found
 
 
 class Assembly:
@@ -134,14 +135,14 @@ class Assembly:
     places : (springs, m), the places of the unknowns that each spring joins, in the order of the banded system.
     """
 
-    def __init__(self, *places: NDArray) -> None:
+    def __init__(self, *places: Int) -> None:
         self._pairs = [np.triu_indices(p.shape[1]) for p in places]
         self.size = 1 + max(int(p.max()) for p in places)
         ends = [np.sort(np.stack([p[:, a], p[:, b]]), axis=0) for p, (a, b) in zip(places, self._pairs, strict=True)]
         self.width = max(int((high - low).max()) for low, high in ends)
         self._slots = np.concatenate([((self.width + 1) * high + self.width - (high - low)).ravel() for low, high in ends])
 
-    def __call__(self, *strains: tuple[NDArray, NDArray]) -> NDArray:
+    def __call__(self, *strains: tuple[Float, Float]) -> Float:
         """Bands of the sum of B^T (stiffness) B, (width + 1, size).
 
         Each argument belongs to one of `places`: rows B of its strains, (springs, strains, m), and their stiffness,
@@ -151,11 +152,11 @@ class Assembly:
         for (b, stiffness), (i, j) in zip(strains, self._pairs, strict=True):
             local = np.matmul((b * stiffness[:, :, None]).transpose(0, 2, 1), b)
             entries.append(local[:, i, j].ravel())
-        total = np.bincount(self._slots, np.concatenate(entries), (self.width + 1) * self.size)
+        total = np.bincount(self._slots, np.concatenate(entries), (self.width + 1) * self.size).astype(float, copy=False)
         return total.reshape(self.size, self.width + 1).T
 
 
-def folded(n: int) -> NDArray:
+def folded(n: int) -> Int:
     """The order 0, n-1, 1, n-2, ... of a ring, in which neighbours are at most two places apart: rings are banded too."""
     order = np.empty(n, dtype=int)
     order[0::2] = np.arange((n + 1) // 2)

@@ -14,16 +14,15 @@ Put m = w (alpha + rho |e|^2) and pi = sqrt(m) omega. Then pi. = (m omega. + m. 
 """
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float, Int
 from discs.chains import stencils
 from discs.chains.chain import Chain
 from discs.chains.rolling_discs import RollingDiscs, folded
 from discs.kernels.limits import LOST_HEADING
-from discs.skew import Load, Placed
+from discs.skew import Load, Parameters, Placed, Secant
 
 
 class SlavedSystem(RollingDiscs):
@@ -51,7 +50,7 @@ class SlavedSystem(RollingDiscs):
 
     # Kinematics
 
-    def shape(self, hi: NDArray, lo: NDArray | None = None) -> NDArray:
+    def shape(self, hi: Float, lo: Float | None = None) -> Float:
         d = stencils.links(hi, self._ends)
         if lo is not None:
             d += stencils.links(lo, self._ends)
@@ -59,41 +58,45 @@ class SlavedSystem(RollingDiscs):
             d[:, -1] += self._shift
         return d
 
-    def moved(self, shape: NDArray, dq: NDArray) -> NDArray:
+    def moved(self, shape: Float, dq: Float) -> Float:
         return shape + stencils.links(dq, self._ends)
 
-    def slope(self, shape: NDArray) -> NDArray:
+    def slope(self, shape: Float) -> Float:
         return stencils.slopes(shape[:2], self._k, self._ends)
 
-    def contact(self, shape: NDArray) -> NDArray:
+    def contact(self, shape: Float) -> Float:
         slope = self.slope(shape)
-        e = slope[::-1] * self._law.arm(self._radius, slope)
+        e: Float = slope[::-1] * self._law.arm(self._radius, slope)
         np.negative(e[0], out=e[0])
         return e
 
-    def contact_rate(self, shape: NDArray, v: NDArray) -> NDArray:
+    def contact_rate(self, shape: Float, v: Float) -> Float:
         turning = self._law.rate(self.slope(shape), self.slope(stencils.links(v, self._ends)))
-        return self._radius * np.array([-turning[1], turning[0]])
+        rate: Float = self._radius * np.array([-turning[1], turning[0]])
+        return rate
 
-    def inertia(self, e: NDArray) -> NDArray:
+    def inertia(self, e: Float) -> Float:
         """Inertia m = w (alpha + rho |e|**2) of each disc against rolling, (n,)."""
-        return self.weights[2] + self.weights[0] * (e[0] ** 2 + e[1] ** 2)
+        m: Float = self.weights[2] + self.weights[0] * (e[0] ** 2 + e[1] ** 2)
+        return m
 
-    def basis(self, shape: NDArray) -> NDArray:
+    def basis(self, shape: Float) -> Float:
         c = np.empty((3, self.n), shape.dtype)
         c[:2] = self.contact(shape)
         c[2] = 1 / np.sqrt(self.inertia(c[:2]))
         c[:2] *= c[2]
         return c
 
-    def forward(self, c: NDArray, p: NDArray) -> NDArray:
+    def forward(self, c: Float, p: Float) -> Float:
         return c * p
 
-    def back(self, c: NDArray, g: NDArray) -> NDArray:
-        return (c * g).sum(axis=0)
+    def back(self, c: Float, g: Float) -> Float:
+        pulled: Float = (c * g).sum(axis=0)
+        return pulled
 
-    def momentum(self, shape: NDArray, rates: NDArray) -> NDArray:
-        return np.sqrt(self.inertia(self.contact(shape))) * rates[0]
+    def momentum(self, shape: Float, rates: Float) -> Float:
+        pi: Float = np.sqrt(self.inertia(self.contact(shape))) * rates[0]
+        return pi
 
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
         """Where headings can vanish: a disc whose r' comes below `LOST_HEADING` on the straight way between two configurations."""
@@ -108,29 +111,29 @@ class SlavedSystem(RollingDiscs):
 
     # Springs
 
-    def potential(self, shape: NDArray) -> float:
+    def potential(self, shape: Float) -> float:
         return self._springs.potential(shape)
 
-    def polarised(self, shape: NDArray, other: NDArray) -> float:
+    def polarised(self, shape: Float, other: Float) -> float:
         return self._springs.polarised(shape, other)
 
-    def secant(self, shape: NDArray, dq: NDArray) -> Any:
+    def secant(self, shape: Float, dq: Float) -> Secant:
         return self._springs.secant(shape, stencils.links(dq, self._ends))
 
-    def mean_force(self, secant: Any) -> NDArray:
+    def mean_force(self, secant: Secant) -> Float:
         return stencils.pull(self._springs.tension(secant), self._ends)
 
     # The linear system of an implicit step
 
     @cached_property
-    def order(self) -> NDArray | None:
+    def order(self) -> Int | None:
         return folded(self.n) if self._ends == "ring" else None
 
-    def stiffness(self, secant: Any, c: NDArray) -> NDArray:
+    def stiffness(self, secant: Secant, c: Float) -> Float:
         return self._springs.stiffness(secant, c)
 
     @cached_property
-    def parameters(self) -> Any:
+    def parameters(self) -> Parameters:
         parts = [part.parameters for part in (self._law, self._springs, self.load) if part is not None]
         if None in parts:
             return None

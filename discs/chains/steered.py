@@ -23,15 +23,15 @@ Free ends of the limit, the planar Simo-Reissner rod rho r.. = n' + lambda, J ph
 """
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float, Int
 from discs.chains import stencils
 from discs.chains.chain import SteeredChain
 from discs.chains.rolling_discs import Assembly, RollingDiscs, folded
-from discs.skew import Load, Placed
+from discs.skew import Load, Parameters, Placed
 
 
 class Links(NamedTuple):
@@ -40,9 +40,9 @@ class Links(NamedTuple):
     d : (4, n_links), differences of neighbours. middle : (n_links,), mean headings of links. phi : (n,), headings.
     """
 
-    d: NDArray
-    middle: NDArray
-    phi: NDArray
+    d: Float
+    middle: Float
+    phi: Float
 
 
 class Section(NamedTuple):
@@ -51,9 +51,9 @@ class Section(NamedTuple):
     along : (2, 2, n_links). across : (2, n_links). strain : (4, n_links): stretch, shear, torsion, bending.
     """
 
-    along: NDArray
-    across: NDArray
-    strain: NDArray
+    along: Float
+    across: Float
+    strain: Float
 
 
 class SteeredSystem(RollingDiscs):
@@ -80,13 +80,15 @@ class SteeredSystem(RollingDiscs):
 
     # Kinematics
 
-    def _middle(self, phi: NDArray, close: float) -> NDArray:
+    def _middle(self, phi: Float, close: float) -> Float:
         """Means of neighbours; around a ring the closing one is taken with the turns made."""
         if self._ends != "ring":
-            return 0.5 * (phi[1:] + phi[:-1])
-        return 0.5 * (phi + np.append(phi[1:], phi[0] + close))
+            middle: Float = 0.5 * (phi[1:] + phi[:-1])
+        else:
+            middle = 0.5 * (phi + np.append(phi[1:], phi[0] + close))
+        return middle
 
-    def shape(self, hi: NDArray, lo: NDArray | None = None) -> Links:
+    def shape(self, hi: Float, lo: Float | None = None) -> Links:
         d = stencils.links(hi, self._ends)
         phi = hi[3]
         if lo is not None:
@@ -96,43 +98,46 @@ class SteeredSystem(RollingDiscs):
             d[:, -1] += self._shift
         return Links(d, self._middle(phi, self._shift[3]), phi)
 
-    def moved(self, shape: Links, dq: NDArray) -> Links:
+    def moved(self, shape: Links, dq: Float) -> Links:
         d = shape.d + stencils.links(dq, self._ends)
         return Links(d, shape.middle + self._middle(dq[3], 0.0), shape.phi + dq[3])
 
-    def slope(self, shape: Links) -> NDArray:
+    def slope(self, shape: Links) -> Float:
         return np.array([np.cos(shape.phi), np.sin(shape.phi)])
 
-    def contact(self, shape: Links) -> NDArray:
-        return self._radius * np.array([-np.sin(shape.phi), np.cos(shape.phi)])
+    def contact(self, shape: Links) -> Float:
+        e: Float = self._radius * np.array([-np.sin(shape.phi), np.cos(shape.phi)])
+        return e
 
-    def contact_rate(self, shape: Links, v: NDArray) -> NDArray:
-        return -self._radius * v[3] * self.slope(shape)
+    def contact_rate(self, shape: Links, v: Float) -> Float:
+        rate: Float = -self._radius * v[3] * self.slope(shape)
+        return rate
 
-    def basis(self, shape: Links) -> NDArray:
+    def basis(self, shape: Links) -> Float:
         c = np.empty((4, self.n))
         c[2:] = 1 / self._roots
         c[:2] = self.contact(shape) * c[2]
         return c
 
-    def forward(self, c: NDArray, p: NDArray) -> NDArray:
+    def forward(self, c: Float, p: Float) -> Float:
         q = np.empty((4, self.n))
         np.multiply(c[:3], p[0], out=q[:3])
         np.multiply(c[3], p[1], out=q[3])
         return q
 
-    def back(self, c: NDArray, g: NDArray) -> NDArray:
+    def back(self, c: Float, g: Float) -> Float:
         return np.array([(c[:3] * g[:3]).sum(axis=0), c[3] * g[3]])
 
-    def momentum(self, shape: Links, rates: NDArray) -> NDArray:
-        return self._roots * rates
+    def momentum(self, shape: Links, rates: Float) -> Float:
+        pi: Float = self._roots * rates
+        return pi
 
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
         return None
 
     # Springs
 
-    def _strain(self, d: NDArray, middle: NDArray) -> NDArray:
+    def _strain(self, d: Float, middle: Float) -> Float:
         cos, sin, k = np.cos(middle), np.sin(middle), self._k
         return np.array([(cos * d[0] + sin * d[1]) / k - 1, (cos * d[1] - sin * d[0]) / k, d[2] / k, d[3] / k])
 
@@ -142,7 +147,7 @@ class SteeredSystem(RollingDiscs):
     def polarised(self, shape: Links, other: Links) -> float:
         raise ValueError("V is not quadratic for discs with their own headings")
 
-    def secant(self, shape: Links, dq: NDArray) -> Section:
+    def secant(self, shape: Links, dq: Float) -> Section:
         after = self.moved(shape, dq)
         half = 0.5 * (after.middle - shape.middle)
         mu = shape.middle + half
@@ -156,7 +161,7 @@ class SteeredSystem(RollingDiscs):
         strain = 0.5 * (self._strain(shape.d, shape.middle) + self._strain(after.d, after.middle))
         return Section(along, across, strain)
 
-    def mean_force(self, secant: Section) -> NDArray:
+    def mean_force(self, secant: Section) -> Float:
         stress = self._stiffness * secant.strain
         tension = np.empty_like(stress)
         tension[0] = secant.along[0, 0] * stress[0] + secant.along[1, 0] * stress[1]
@@ -174,13 +179,13 @@ class SteeredSystem(RollingDiscs):
     # The linear system of an implicit step
 
     @cached_property
-    def order(self) -> NDArray:
+    def order(self) -> Int:
         """Roll and heading of a disc side by side, discs in their (folded) order."""
         discs = folded(self.n) if self._ends == "ring" else np.arange(self.n)
         return np.stack([discs, discs + self.n], axis=1).ravel()
 
     @cached_property
-    def _sides(self) -> tuple[NDArray, NDArray]:
+    def _sides(self) -> tuple[Int, Int]:
         first = np.arange(self._stiffness.shape[1])
         return first, (first + 1) % self.n
 
@@ -190,7 +195,7 @@ class SteeredSystem(RollingDiscs):
         first, second = self._sides
         return Assembly(np.stack([place[first], place[first + self.n], place[second], place[second + self.n]], axis=1))
 
-    def stiffness(self, secant: Section, c: NDArray) -> NDArray:
+    def stiffness(self, secant: Section, c: Float) -> Float:
         first, second = self._sides
         b = np.zeros((first.size, 4, 4))
         for roll, disc, sign in ((0, first, -1.0), (2, second, 1.0)):
@@ -201,7 +206,7 @@ class SteeredSystem(RollingDiscs):
         return self._assembly((b, self._stiffness.T))
 
     @cached_property
-    def parameters(self) -> Any:
+    def parameters(self) -> Parameters:
         if self.load is not None and self.load.parameters is None:
             return None
         from discs.kernels import steered  # numba is slow to import

@@ -9,7 +9,8 @@ a spring too), "ring" (none). Beyond each free end lies a ghost disc, see `exten
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from discs.arrays import Float
 
 ENDS = ("springs", "consistent", "paper", "ring")
 
@@ -19,7 +20,7 @@ def spacing(n: int, length: float, ends: str) -> float:
     return length / (n if ends == "ring" else n - 1)
 
 
-def shares(n: int, k: float, ends: str) -> NDArray:
+def shares(n: int, k: float, ends: str) -> Float:
     """Length that each disc stands for, (n,): k, and k/2 at free ends.
 
     The paper gives its end discs the full k: the rod is then k longer than it should be, an error of first order.
@@ -30,7 +31,7 @@ def shares(n: int, k: float, ends: str) -> NDArray:
     return w
 
 
-def links(values: NDArray, ends: str) -> NDArray:
+def links(values: Float, ends: str) -> Float:
     """Differences of neighbours along the last axis, (..., n) -> (..., n_links)."""
     inner = values[..., 1:] - values[..., :-1]
     if ends != "ring":
@@ -38,7 +39,7 @@ def links(values: NDArray, ends: str) -> NDArray:
     return np.concatenate([inner, values[..., :1] - values[..., -1:]], axis=-1)
 
 
-def pull(tension: NDArray, ends: str) -> NDArray:
+def pull(tension: Float, ends: str) -> Float:
     """The transpose of `links`, (..., n_links) -> (..., n): minus the force that link tensions exert on the discs."""
     if ends == "ring":
         return np.roll(tension, 1, axis=-1) - tension
@@ -49,7 +50,7 @@ def pull(tension: NDArray, ends: str) -> NDArray:
     return force
 
 
-def extended(d: NDArray, ends: str) -> NDArray:
+def extended(d: Float, ends: str) -> Float:
     """Links with one more at each end, (..., n_links) -> (..., n + 1): the i-th lies before disc i, the next one after it.
 
     Around a ring the closing link is the first and the last. Beyond a free end lies a ghost disc, at "springs" and "paper" ends
@@ -67,7 +68,7 @@ def extended(d: NDArray, ends: str) -> NDArray:
     return longer
 
 
-def gathered(tension: NDArray, ends: str) -> NDArray:
+def gathered(tension: Float, ends: str) -> Float:
     """The transpose of `extended`, (..., n + 1) -> (..., n_links): what pulls at a ghost link pulls at those it is made of."""
     if ends == "ring":
         own = tension[..., 1:].copy()
@@ -80,7 +81,7 @@ def gathered(tension: NDArray, ends: str) -> NDArray:
     return own
 
 
-def slopes(d: NDArray, k: float, ends: str) -> NDArray:
+def slopes(d: Float, k: float, ends: str) -> Float:
     """Headings r' at the discs from the links, (..., n_links) -> (..., n).
 
     Inside, and with the ghosts everywhere, r'_i = (r_{i+1} - r_{i-1})/2k. At an end
@@ -91,7 +92,7 @@ def slopes(d: NDArray, k: float, ends: str) -> NDArray:
     return (longer[..., 1:] + longer[..., :-1]) / (2 * k)
 
 
-def bends(d: NDArray, ends: str) -> NDArray:
+def bends(d: Float, ends: str) -> Float:
     """k**2 r'' at the discs from the links, (..., n_links) -> (..., n): k**2 r''_i = r_{i+1} - 2 r_i + r_{i-1}.
 
     With "consistent" ends that is 2 r_0 - 5 r_1 + 4 r_2 - r_3 at an end; "springs" and "paper" have no spring there.
@@ -99,7 +100,7 @@ def bends(d: NDArray, ends: str) -> NDArray:
     return np.diff(extended(d, ends))
 
 
-def bend_bands(stiffness: NDArray, ends: str) -> NDArray:
+def bend_bands(stiffness: Float, ends: str) -> Float:
     """B^T (stiffness) B for B that takes discs to `bends`, (4, n): [j, i] couples discs i and i + j, around a ring n and 0 too.
 
     stiffness : (n,), zero where there is no spring.
@@ -120,7 +121,7 @@ def bend_bands(stiffness: NDArray, ends: str) -> NDArray:
     return bands
 
 
-def bend_shares(n: int, k: float, ends: str) -> NDArray:
+def bend_shares(n: int, k: float, ends: str) -> Float:
     """Length that each bend stands for, (n_bends,): k, and k/2 for the end bends of "consistent"."""
     w = np.full(n if ends in ("ring", "consistent") else n - 2, k)
     if ends == "consistent":

@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import ROLLING
 from discs.problem import Problem, State
@@ -23,7 +23,7 @@ DURATION = 4.5
 TURNS = 0.5
 
 
-def twisted(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def twisted(s: Float, length: float, amplitude: float) -> tuple[Float, Float, Float, Float]:
     """x, y, theta, omega of a straight rod at rest, theta = -amplitude cos(pi s/length)."""
     return s, 0 * s, -amplitude * np.cos(np.pi * s / length), 0 * s
 

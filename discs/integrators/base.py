@@ -4,13 +4,13 @@ import signal
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, final
+from typing import Any, ClassVar, NamedTuple, TypeAlias, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float, Int
 from discs.chains.rolling_discs import RollingDiscs
-from discs.skew import Phase
+from discs.skew import Parameters, Phase
 
 
 @dataclass
@@ -49,7 +49,8 @@ class Tally(NamedTuple):
     blown: bool
 
 
-Looks = tuple[int, NDArray, NDArray, NDArray, float]  # what `discs.kernels.driver` is told of them
+Memory: TypeAlias = Any  # what a method keeps between steps, of its own kind
+Looks = tuple[int, Int, Float, Float, float]  # what `discs.kernels.driver` is told of them
 NO_LOOKS: Looks = 0, np.empty(0, np.int64), np.empty((1, 1, 0)), np.empty((1, 2, 1)), np.inf
 
 
@@ -64,11 +65,11 @@ class Frame(NamedTuple):
     seen : q, energy and largest slip, where the compiled form found them on the way.
     """
 
-    hi: NDArray
-    lo: NDArray
-    rate: NDArray
+    hi: Float
+    lo: Float
+    rate: Float
     lost: int = -1
-    seen: tuple[NDArray, float, float] | None = None
+    seen: tuple[Float, float, float] | None = None
 
 
 class Integrator(ABC):
@@ -107,33 +108,35 @@ class Integrator(ABC):
         """Whether it has a compiled form, or takes the chain's in a form of its own; else it runs on the plain engine."""
 
     @abstractmethod
-    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Any:
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> Memory:
         """What the method must remember between steps of size h, at the first time.
 
         `chain`, here and below, are the parameters for the compiled form, `system.parameters`; None for the plain one.
         """
 
     @abstractmethod
-    def advance(self, system: RollingDiscs, memory: Any, t: float, h: float, work: Work) -> Any:
+    def advance(self, system: RollingDiscs, memory: Memory, t: float, h: float, work: Work) -> Memory:
         """The memory one step h later than t."""
 
     @abstractmethod
-    def at(self, system: RollingDiscs, memory: Any, t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(
+        self, system: RollingDiscs, memory: Memory, t: float, tau: float, h: float, work: Work, chain: Parameters = None
+    ) -> Frame:
         """The discs a time 0 <= tau < h after the last step (of size h) to t; the trajectory is not touched."""
 
     @abstractmethod
-    def kinetic(self, system: RollingDiscs, memory: Any, h: float) -> float:
+    def kinetic(self, system: RollingDiscs, memory: Memory, h: float) -> float:
         """Kinetic energy at the last step; for a two-step method, half a step later."""
 
     @abstractmethod
-    def keep(self, memory: Any) -> dict[str, Any]:
+    def keep(self, memory: Memory) -> dict[str, Any]:
         """The memory as arrays and numbers by name, all that `recall` needs to go on bit for bit."""
 
     @abstractmethod
-    def recall(self, memory: Any, kept: dict[str, Any]) -> Any:
+    def recall(self, memory: Memory, kept: dict[str, Any]) -> Memory:
         """The memory that was kept; `memory` is that of `begin`, of the same run."""
 
-    def finer(self, system: RollingDiscs, memory: Any, t: float, h: float, chain: Any = None) -> NDArray | None:
+    def finer(self, system: RollingDiscs, memory: Memory, t: float, h: float, chain: Parameters = None) -> Float | None:
         """Positions (rows, n) one step h later, of an error several times smaller, for `discs.running.step_error`.
 
         None: steps are checked as they are taken.
@@ -149,7 +152,7 @@ class Integrator(ABC):
         """The same method with its sweeps converged to a tolerance; itself where it has no sweeps, or a fixed number of them."""
         return self
 
-    def extras(self, system: RollingDiscs, memory: Any, h: float) -> dict[str, float]:
+    def extras(self, system: RollingDiscs, memory: Memory, h: float) -> dict[str, float]:
         """The quantities in `offers`, at the last step."""
         return {}
 
@@ -166,7 +169,7 @@ class FixedStep(Integrator):
     adaptive: ClassVar[bool] = False
 
     @property
-    def parameters(self) -> Any:
+    def parameters(self) -> Parameters:
         return None
 
     @final
@@ -176,8 +179,8 @@ class FixedStep(Integrator):
 
     @final
     def march(
-        self, chain: Any, memory: Any, t: float, h: float, steps: int, bound: float, looks: Looks = NO_LOOKS
-    ) -> tuple[Any, Tally]:
+        self, chain: Parameters, memory: Memory, t: float, h: float, steps: int, bound: float, looks: Looks = NO_LOOKS
+    ) -> tuple[Memory, Tally]:
         """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.parameters`.
 
         Stops after a step whose kinetic energy is not below `bound`, and after one in which a disc loses its heading; the returned
@@ -201,7 +204,7 @@ class OneStep(FixedStep):
         """The state a step h after z at the time t, a pure function of its arguments (work is counted up)."""
 
     @final
-    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> Phase:
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> Phase:
         return z
 
     @final
@@ -209,7 +212,9 @@ class OneStep(FixedStep):
         return self.step(system, memory, t, h, work)
 
     @final
-    def at(self, system: RollingDiscs, memory: Phase, t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(
+        self, system: RollingDiscs, memory: Phase, t: float, tau: float, h: float, work: Work, chain: Parameters = None
+    ) -> Frame:
         if chain is None:
             z = self.step(system, memory, t, tau, work) if tau else memory
             return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi))
@@ -225,9 +230,10 @@ class OneStep(FixedStep):
         return Frame(z.hi, z.lo, rate, lost, (q, energy, slip))
 
     @final
-    def finer(self, system: RollingDiscs, memory: Phase, t: float, h: float, chain: Any = None) -> NDArray:
+    def finer(self, system: RollingDiscs, memory: Phase, t: float, h: float, chain: Parameters = None) -> Float:
         if chain is not None:
-            return self.march(chain, memory, t, 0.5 * h, 2, np.inf)[0].hi
+            z: Phase = self.march(chain, memory, t, 0.5 * h, 2, np.inf)[0]
+            return z.hi
         work = Work()
         return self.step(system, self.step(system, memory, t, 0.5 * h, work), t + 0.5 * h, 0.5 * h, work).hi
 

@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
 from discs.integrators.base import Frame, Integrator, Work
 from discs.kernels.shared import columns
-from discs.skew import Phase
+from discs.skew import Parameters, Phase
 
 
 class Reduced:
@@ -26,21 +26,21 @@ class Reduced:
     chain : `system.parameters` for the compiled form, None for the plain one.
     """
 
-    def __init__(self, system: RollingDiscs, chain: Any = None) -> None:
+    def __init__(self, system: RollingDiscs, chain: Parameters = None) -> None:
         self.system, self.chain, self.rows, self.n = system, chain, len(system.rows), system.n
-        self.each = self.rows + columns(self.rows)  # unknowns of a disc
+        self.each: int = self.rows + columns(self.rows)  # unknowns of a disc
 
-    def join(self, q: NDArray, pi: NDArray) -> NDArray:
+    def join(self, q: Float, pi: Float) -> Float:
         """y of positions (rows, n) and momenta."""
         return np.concatenate([q, np.atleast_2d(pi)]).T.ravel()
 
-    def split(self, y: NDArray) -> Phase:
+    def split(self, y: Float) -> Phase:
         """Positions and momenta of y."""
         state = y.reshape(self.n, -1).T
         q, pi = np.ascontiguousarray(state[: self.rows]), np.ascontiguousarray(state[self.rows :])
         return Phase(q, np.zeros_like(q), pi if len(pi) > 1 else pi[0])
 
-    def __call__(self, t: float, y: NDArray) -> NDArray:
+    def __call__(self, t: float, y: Float) -> Float:
         """The rate of y."""
         if self.chain is not None:
             import discs.kernels.driver as driver
@@ -100,7 +100,7 @@ class SolveIvp(Integrator, ABC):
         """What the method is told about the Jacobian."""
         return {}
 
-    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> "Course":
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> "Course":
         f = Reduced(system, chain)
         method = getattr(scipy.integrate, self.name)
         y = f.join(z.hi + z.lo, z.pi)
@@ -113,7 +113,9 @@ class SolveIvp(Integrator, ABC):
     def advance(self, system: RollingDiscs, memory: "Course", t: float, h: float, work: Work) -> "Course":
         return memory.to(memory.time + h, work)
 
-    def at(self, system: RollingDiscs, memory: "Course", t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(
+        self, system: RollingDiscs, memory: "Course", t: float, tau: float, h: float, work: Work, chain: Parameters = None
+    ) -> Frame:
         z = memory.to(memory.time + tau, work) if tau else memory
         return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi))
 

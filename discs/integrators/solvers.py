@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
+from discs.arrays import Float
+
 PARTS = ("data", "indices", "indptr")
 
 
@@ -25,9 +27,10 @@ class Factors:
     def __init__(self, matrix: "scipy.sparse.csc_matrix", make: Callable[["scipy.sparse.csc_matrix"], Any]) -> None:
         self.matrix, self._factors = matrix, make(matrix)
 
-    def solve(self, b: np.ndarray) -> np.ndarray:
+    def solve(self, b: Float) -> Float:
         """Solve with the matrix."""
-        return self._factors.solve(b)
+        found: Float = self._factors.solve(b)
+        return found
 
 
 def keep(solver: "scipy.integrate.OdeSolver") -> dict[str, Any]:

@@ -123,11 +123,12 @@ def off_between_frames(run: Solution, radius: float) -> float:
     way, size = np.diff(r, axis=0), _radius(run)
     across = [np.abs((way * d).sum(axis=1)) for d in (along[:-1], along[1:])]
     moved = 0.25 * np.maximum(*across)
-    if size is not None or run.x_rate is not None:
-        if run.x_rate is not None and run.y_rate is not None:
-            rate = np.stack([run.x_rate, run.y_rate], axis=1)
-        else:
-            rate = size * run.omega[:, None] * _size(run) * turn(along)
+    rate: Float | None = None
+    if run.x_rate is not None and run.y_rate is not None:
+        rate = np.stack([run.x_rate, run.y_rate], axis=1)
+    elif size is not None:
+        rate = size * run.omega[:, None] * _size(run) * turn(along)
+    if rate is not None:
         moved = np.hypot(*(_quarter(h, way[:, j], rate[:, j]) for j in range(2)))
     return float((turned + moved / radius).max())
 
@@ -136,7 +137,7 @@ def _quarter(h: Float, change: Float, rate: Float) -> Float:
     return 0.25 * np.maximum(np.abs(h * rate[:-1] - change), np.abs(h * rate[1:] - change))
 
 
-def _size(run: Solution) -> Any:
+def _size(run: Solution) -> float | Float:
     """|h| of the law of rolling, (F, 1, N), or 1."""
     told = getattr(run.problem.chain, "rolling", None) if run.problem is not None else _scene(run).get("rolling")
     law = ROLLING.get(str(told)) if run.phi is None else None

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.integrators import from_settings
 from discs.problem import Problem, State
 from discs.skew import SkewGradient
@@ -104,8 +104,9 @@ def nudged(problem: Problem) -> Problem:
     """The problem from positions and angles one unit in the last place away, to either side."""
     start, rng = problem.initial, np.random.default_rng(0)
 
-    def nudge(value: NDArray) -> NDArray:
-        return np.nextafter(value, value + rng.choice((-1.0, 1.0), value.shape))
+    def nudge(value: Float) -> Float:
+        near: Float = np.nextafter(value, value + rng.choice((-1.0, 1.0), value.shape))
+        return near
 
     moved = {name: nudge(np.array(getattr(start, name))) for name in problem.system.rows}
     rates = {"omega": start.omega, "phi_rate": start.phi_rate}

@@ -4,9 +4,10 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from discs import checks
+from discs.arrays import Float
 from discs.integrators.base import Frame
 from discs.running.time_loop import March
 
@@ -21,7 +22,7 @@ def steps_before(time: float, h: float) -> tuple[int, float]:
     return steps, rest if rest > 1e-9 * h else 0.0
 
 
-def frame_times(frames: int | ArrayLike, duration: float) -> NDArray:
+def frame_times(frames: int | ArrayLike, duration: float) -> Float:
     """The times of frames, (F,), from their number or themselves; see `simulate`.
 
     A time outside the duration by no more than rounding, as `np.arange(0, 0.35, 0.1)` makes of 0.3, is taken at its end.

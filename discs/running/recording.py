@@ -11,12 +11,13 @@ import threading
 import time as clock
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.files import archive, safe, schema, untrusted
 from discs.files.finishing import finish, outside
 from discs.files.framefile import FrameFile, room
@@ -35,7 +36,7 @@ SETTINGS = ("settings", "dt", "engine", "want")  # of stats: what a run must sha
 class Rows:
     """Frames in memory."""
 
-    def __init__(self, problem: Problem, times: NDArray) -> None:
+    def __init__(self, problem: Problem, times: Float) -> None:
         self.problem, self.times = problem, times
         self.rows: dict[str, Any] = {}
 
@@ -86,7 +87,7 @@ class Recording(Rows):
     """
 
     def __init__(
-        self, problem: Problem, times: NDArray, path: str | Path, about: Stats, estimate: dict[str, float] | None = None
+        self, problem: Problem, times: Float, path: str | Path, about: Stats, estimate: dict[str, float] | None = None
     ) -> None:
         super().__init__(problem, times)
         self.path, self.about, self.estimate = archive.named(path), about, estimate
@@ -106,7 +107,7 @@ class Recording(Rows):
             self._close()
             raise
         # Ctrl-C is heard between steps, where the memory is whole; the second one at once
-        self._handler: Any = None
+        self._handler: Callable[[int, FrameType | None], object] | int | None = None
         if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             self._handler = signal.signal(signal.SIGINT, self._interrupted)
         return self
@@ -124,7 +125,7 @@ class Recording(Rows):
         if not self.complete and not self.restart.held:
             raise ValueError(f"{self.path} holds a run that is not finished, and {self.restart.path} cannot be written")
 
-    def _interrupted(self, number: int, frame: Any) -> None:
+    def _interrupted(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -197,7 +198,7 @@ class Recording(Rows):
                 f"interrupted at step {march.step}; {self.path} holds {f} of {self.times.size} frames, and {how}"
             )
 
-    def _keep(self, f: int, march: March, more: dict[str, NDArray]) -> None:
+    def _keep(self, f: int, march: March, more: dict[str, Float]) -> None:
         """Replace the restart file; its lock goes on with the new one. Where there is no room for it the run goes on."""
         seconds = self.seconds + clock.perf_counter() - self._started
         try:
@@ -243,7 +244,7 @@ class Recording(Rows):
                 raise ValueError(f"{self.path} holds another run, whose {name} differs{words}; give another path, or delete it")
 
 
-def _told(problem: Problem, times: NDArray, stats: Stats) -> dict[str, str | bytes]:
+def _told(problem: Problem, times: Float, stats: Stats) -> dict[str, str | bytes]:
     """All that makes a run what it is, by name: a hash of each array, the rest as text."""
     numbers, arrays = schema.describe(problem)
     told = {name: stats.get(name) for name in SETTINGS} | numbers

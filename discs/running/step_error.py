@@ -15,16 +15,14 @@ waves do not add up, and too small where the motion amplifies differences. A run
 is taken again with half the step, and the change (4/3 of it, the error if that goes like h^2) takes the place of the estimate.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
-from discs.integrators.base import FixedStep, Looks, Tally, Work
+from discs.integrators.base import FixedStep, Looks, Memory, Tally, Work
 from discs.kernels.limits import TURNED
 from discs.running.stats import Stats
-from discs.skew import Phase
+from discs.skew import Parameters, Phase
 
 EVERY = 50  # steps, of which one is looked at
 MOST = 8  # steps looked at in a run
@@ -70,7 +68,7 @@ class Watch:
         k = self.passed
         return first, self.looks[k:], self.places[k if self.short else 0 :], self.defects[k:], self.limit
 
-    def look(self, step: int, before: NDArray, after: NDArray) -> bool:
+    def look(self, step: int, before: Float, after: Float) -> bool:
         """The plain form of a look: positions before and after a step, the last of `step`; whether it is to be compared."""
         if self.passed == self.looks.size or not 0 <= (ahead := int(self.looks[self.passed]) - step) < FEW:
             return False
@@ -89,11 +87,11 @@ class Watch:
         self._take(defect, size, after)
         return False
 
-    def compare(self, one: NDArray, two: NDArray) -> None:
+    def compare(self, one: Float, two: Float) -> None:
         """Take positions (rows, n) by one step and by two halves in place of a look."""
         self._take(np.abs(one - two).max(axis=1), np.abs(two).max(axis=1), one)
 
-    def _take(self, off: NDArray, size: NDArray, place: NDArray) -> None:
+    def _take(self, off: Float, size: Float, place: Float) -> None:
         self.defects[self.passed] = off, size
         self.places[self.passed if self.short else 0] = place
         self.passed, self.doubted = self.passed + 1, False
@@ -113,7 +111,7 @@ class Watch:
         return float(np.maximum.reduce(np.add.reduce(seen[:, 0]) / size)) * SAFETY * (self.steps or 1) / self.passed
 
     def again(
-        self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: NDArray, h: float, parameters: Any
+        self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: Float, h: float, parameters: Parameters
     ) -> float | None:
         """The error by a run with half the step, at the places kept and at the `last` one; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
@@ -129,8 +127,8 @@ class Watch:
 
 
 def advanced(
-    system: RollingDiscs, integrator: FixedStep, memory: Any, t: float, h: float, steps: int, parameters: Any
-) -> tuple[Any, Tally]:
+    system: RollingDiscs, integrator: FixedStep, memory: Memory, t: float, h: float, steps: int, parameters: Parameters
+) -> tuple[Memory, Tally]:
     """What the integrator remembers some steps later, and what they cost."""
     if parameters is not None:
         return integrator.march(parameters, memory, t, h, steps, np.inf)
@@ -140,7 +138,9 @@ def advanced(
     return memory, Tally(steps, work.gradients, work.solves, work.unconverged, -1, 0, False, False)
 
 
-def converging(system: RollingDiscs, integrator: FixedStep, before: Any, t: float, steps: int, h: float, parameters: Any) -> float:
+def converging(
+    system: RollingDiscs, integrator: FixedStep, before: Memory, t: float, steps: int, h: float, parameters: Parameters
+) -> float:
     """A step with which the first of `steps` steps that does not converge, from a state, would; h/2^HALVINGS if none was found."""
     for _ in range(steps):
         after, tally = advanced(system, integrator, before, t, h, 1, parameters)
@@ -150,7 +150,8 @@ def converging(system: RollingDiscs, integrator: FixedStep, before: Any, t: floa
     for halving in range(1, HALVINGS + 1):
         if not advanced(system, integrator, before, t, h / 2**halving, 2**halving, parameters)[1].unconverged:
             break
-    return h / 2**halving
+    shorter: float = h / 2**halving
+    return shorter
 
 
 def doubts(stats: Stats) -> list[str]:
@@ -168,7 +169,7 @@ def doubts(stats: Stats) -> list[str]:
 
 def cure(stats: Stats) -> str:
     """A step that might do, in words: with it the run's steps converge, and err by AIM if errors go like its square."""
-    shorter = stats["dt"] * np.sqrt(min(AIM / (stats.get("step_error") or AIM), 1.0))
+    shorter: float = stats["dt"] * np.sqrt(min(AIM / (stats.get("step_error") or AIM), 1.0))
     return f"dt = {min(shorter, stats.get('converging_dt', np.inf)):.2g}"
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.integrators import Integrator, find
 from discs.problem import Problem
 
@@ -40,7 +40,7 @@ def _stiffest(problem: Problem) -> float:
     shape = system.shape(z.hi, z.lo)
     c = system.basis(shape)
 
-    def apply(p: NDArray) -> NDArray:
+    def apply(p: Float) -> Float:
         move = system.forward(c, p.reshape(z.pi.shape))
         eps = 1e-6 * problem.chain.k / max(float(np.abs(move).max()), 1e-300)
         force = system.gradient(system.moved(shape, eps * move)) - system.gradient(system.moved(shape, -eps * move))

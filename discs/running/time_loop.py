@@ -7,8 +7,9 @@ import numpy as np
 
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import FixedStep, Integrator, Work
-from discs.integrators.base import NO_LOOKS, Cut, Frame
+from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory
 from discs.problem import Problem
+from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
 from discs.warn import warn
@@ -32,7 +33,7 @@ class SimulationError(RuntimeError):
         super().__init__(f"{message} (step {step}, time {time:g}, disc {disc})")
         self.message, self.step, self.time, self.disc, self.slope = message, step, time, disc, slope
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.message, self.step, self.time, self.disc, self.slope)
 
 
@@ -72,7 +73,7 @@ class March:
         self, problem: Problem, integrator: Integrator, h: float, compiled: bool, quiet: bool, watch: Watch | None = None
     ) -> None:
         self.problem, self.integrator, self.h, self.watch = problem, integrator, h, watch
-        self.stuck: list[tuple[Any, float, int]] = []
+        self.stuck: list[tuple[Memory, float, int]] = []
         self.system, self.work, self.step = problem.system, Work(), 0
         self.parameters = self.system.parameters if compiled else None
         fixed: Any = None if integrator.adaptive else integrator
@@ -84,7 +85,7 @@ class March:
             warn(problem.ill_posed)
         if integrator.stability_limit == np.inf and not integrator.adaptive:
             _warn_of_lost_digits(self.system, h)
-        self.memory: Any = integrator.begin(self.system, problem.start(), h, self.work, self.parameters)
+        self.memory: Memory = integrator.begin(self.system, problem.start(), h, self.work, self.parameters)
         if self.parameters is not None:
             self._prepare(quiet)
 
@@ -139,7 +140,7 @@ class March:
             self._remember(before, taken, cost["unconverged"])
         self.step += taken
 
-    def _compare(self, watch: Watch, before: Any) -> None:
+    def _compare(self, watch: Watch, before: Memory) -> None:
         """Compare the step just taken with one of less error."""
         finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.parameters)
         watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
@@ -160,12 +161,12 @@ class March:
             return found if again is None else again
         return found
 
-    def _remember(self, before: Any, steps: int, stuck: int) -> None:
+    def _remember(self, before: Memory, steps: int, stuck: int) -> None:
         """Keep a state from which steps did not converge, whenever their number has doubled: the first and the last three."""
         if not stuck or stuck.bit_length() < self.work.unconverged.bit_length():
             self.stuck = [*self.stuck[:1], *self.stuck[1:][-2:], (before, self.step * self.h, steps)]
 
-    def remedy(self) -> dict[str, float]:
+    def remedy(self) -> Stats:
         """A step that converges where the run's did not, by the name that `stats` has for it; empty if it is not known."""
         if not self.stuck or not isinstance(self.integrator, FixedStep):
             return {}
@@ -219,7 +220,7 @@ class March:
             self._compare(self.watch, previous)
         return 1
 
-    def _lost(self, before: Any, after: Placed, h: float, by_velocity: bool) -> int | None:
+    def _lost(self, before: Memory, after: Placed, h: float, by_velocity: bool) -> int | None:
         """A disc that lost its heading on the straight way from memory `before` to `after`, or that its velocity pointed.
 
         The velocity tells where a step did not converge, as its end is then undefined, and in explicit steps, whose stages
@@ -251,11 +252,11 @@ class March:
                 watch.passed, watch.doubted = watch.passed + tally.passed, tally.doubted
         return tally.steps
 
-    def _check(self, lost: int | None, step: int, before: Any) -> None:
+    def _check(self, lost: int | None, step: int, before: Memory) -> None:
         self._check_heading(lost, step, step * self.h, before)
         self._check_energy(self.integrator.kinetic(self.system, self.memory, self.h), None, step, step * self.h)
 
-    def _check_heading(self, lost: int | None, step: int, time: float, before: Any) -> None:
+    def _check_heading(self, lost: int | None, step: int, time: float, before: Memory) -> None:
         if lost is not None:
             law = getattr(self.problem.chain, "rolling", None)
             slope = np.hypot(*self.system.slope(self.system.shape(before.hi, before.lo)))[lost]
