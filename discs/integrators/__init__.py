@@ -1,7 +1,9 @@
-"""The integrators, by name."""
+"""The integrators, one file each, found by name: a method is any class in these files that has a `name`."""
 
 import ast
+import pkgutil
 from functools import cache
+from importlib import import_module
 from typing import Any
 
 from discs import checks
@@ -14,9 +16,15 @@ from discs.integrators.midpoint import Midpoint
 from discs.integrators.perlmutter import McLachlanPerlmutter
 from discs.integrators.rk4 import RK4
 
-_OWN: tuple[type[Integrator], ...] = (Midpoint, Suzuki4, KahanLi6, Gauss4, Gauss6, Gauss8, Leapfrog, McLachlanPerlmutter, RK4)
-_SCIPY: tuple[type[Integrator], ...] = (RK45, DOP853, Radau, BDF, LSODA)
-METHODS: dict[str, type[Integrator]] = {cls.name: cls for cls in (*_OWN, *_SCIPY)}
+
+def _methods() -> dict[str, type[Integrator]]:
+    """The classes with a name in the files beside this one."""
+    modules = [import_module(f"{__name__}.{file.name}") for file in pkgutil.iter_modules(__path__)]
+    classes = [cls for module in modules for cls in vars(module).values() if isinstance(cls, type) and issubclass(cls, Integrator)]
+    return {cls.name: cls for cls in classes if hasattr(cls, "name")}
+
+
+METHODS = _methods()
 
 
 def find(method: str | Integrator) -> Integrator:

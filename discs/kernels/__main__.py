@@ -6,13 +6,21 @@ from typing import Any
 
 from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import ROLLING
-from discs.integrators import METHODS
+from discs.integrators import METHODS, FixedStep, Integrator
 from discs.problem import Problem, State
 from discs.simulation import simulate
 
 ONES = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius")
 OWN = ("heading_inertia", "stretch_stiffness", "shear_stiffness")
-OF = {"midpoint": "compositions", "gauss6": "Gauss methods"}  # kernels that several methods share
+
+
+def sharing() -> list[list[Integrator]]:
+    """All methods with a compiled form, those together that share kernels: with parameters of one type, or adaptive."""
+    found: dict[type, list[Integrator]] = {}
+    for method in (cls() for cls in METHODS.values()):
+        if method.compiles:
+            found.setdefault(type(method.parameters) if isinstance(method, FixedStep) else Integrator, []).append(method)
+    return list(found.values())
 
 
 def compile_for(law: str) -> None:
@@ -22,9 +30,9 @@ def compile_for(law: str) -> None:
     chain: Chain | SteeredChain = SteeredChain(**values) if own else Chain(**values, rolling=law)
     words = "discs with own headings" if own else f"discs with slaved headings, {law} law"
     problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if own else None), 0.01)  # at rest
-    for name in ("midpoint", "gauss6", "rk4", "leapfrog", "mclachlan-perlmutter", "RK45"):
-        simulate(problem, METHODS[name](), 0.005, frames=1, progress=False)
-        print(f"{words}: {OF.get(name, name)} compiled", flush=True)
+    for methods in sharing():
+        simulate(problem, methods[0], 0.005, frames=1, progress=False)
+        print(f"{words}: {', '.join(method.name for method in methods)} compiled", flush=True)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import numpy as np
 
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import FixedStep, Integrator, Work
-from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory
+from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory, Tally
 from discs.problem import Problem
 from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, converging
@@ -127,14 +127,21 @@ class March:
 
     def on(self, step: int) -> None:
         """Go on towards a step, not beyond it; no way at all where Ctrl-C was heard and did not raise."""
-        before, cost = self.memory, vars(self.work).copy()
+        before, cost, watch, looks = self.memory, vars(self.work).copy(), self.watch, NO_LOOKS
         try:
-            taken = self._plain() if self.twin is None else self._compiled(self.twin, min(self.chunk, step - self.step))
+            if self.twin is None:
+                taken = self._plain()
+            else:
+                steps = min(self.chunk, step - self.step)
+                if watch is not None:
+                    steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
+                self.memory, tally = self.twin.march(self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks)
+                taken = self._accept(self.twin, before, tally)
         except Cut:  # all of this turn is dropped
             self.memory = before
             vars(self.work).update(cost)
-            if self.watch is not None:
-                self.watch.put_off(self.step)
+            if watch is not None:
+                watch.put_off(self.step)
             return
         if self.work.unconverged > cost["unconverged"]:
             self._remember(before, taken, cost["unconverged"])
@@ -235,11 +242,9 @@ class March:
     def _gave_up(self, error: ArithmeticError) -> SimulationError:
         return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)
 
-    def _compiled(self, twin: FixedStep, steps: int) -> int:
-        previous, watch, looks = self.memory, self.watch, NO_LOOKS
-        if watch is not None:
-            steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
-        self.memory, tally = twin.march(self.parameters, previous, self.step * self.h, self.h, steps, self.bound, looks)
+    def _accept(self, twin: FixedStep, previous: Memory, tally: Tally) -> int:
+        """Count and check compiled steps from the memory `previous`; returns how many they are."""
+        watch = self.watch
         self.work.add(tally)
         if tally.lost >= 0:
             previous, _ = twin.march(self.parameters, previous, self.step * self.h, self.h, tally.steps - 1, self.bound)

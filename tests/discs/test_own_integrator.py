@@ -1,12 +1,13 @@
 """A user's own integrators: plain ones run at once, and Gauss collocation of any number of stages."""
 
+import sys
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
-from discs import simulate
+from discs import integrators, simulate
 from discs.integrators import Gauss, OneStep
 from discs.skew import Phase, add
 from tests.conftest import STEERED, Model, models, uneven
@@ -45,6 +46,15 @@ def test_a_method_without_a_compiled_form_runs_on_the_plain_engine(model):
         assert run.stats["method"] == "heun"
         errors.append(abs(run.theta - exact.theta).max())
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2, abs=0.1)
+
+
+def test_a_file_beside_the_others_is_found_by_the_name_of_its_method(tmp_path, monkeypatch):
+    code = "from tests.discs.test_own_integrator import Heun\nclass Mine(Heun):\n    name = 'mine'\n"
+    (tmp_path / "a_file_of_mine.py").write_text(code)
+    monkeypatch.setattr(integrators, "__path__", [*integrators.__path__, str(tmp_path)])
+    found = integrators._methods()
+    module = sys.modules.pop("discs.integrators.a_file_of_mine")
+    assert found == integrators.METHODS | {"heun": Heun, "mine": module.Mine}
 
 
 class Gauss10(Gauss):
