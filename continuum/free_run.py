@@ -12,7 +12,7 @@ from continuum.free_system import FreeRod, State
 from continuum.rod import Rod
 from discs import Chain, SimulationError
 from discs.chains.chain import FEWEST
-from discs.simulation import LOST
+from discs.simulation import ENERGY_DRIFT_WARNING
 
 TURN = 0.08  # rad: of the fastest link in a step; energy was kept to 1 % with it in all 43 random cases that were off
 BLOWN_UP = 10.0  # times the energy of the start
@@ -97,9 +97,9 @@ class Watch:
 
     def said(self) -> str:
         """What to warn of; empty where all is well."""
-        if self._off <= LOST * self._energy:
+        if self._off <= ENERGY_DRIFT_WARNING * self._energy:
             return ""
-        enough = min(self._h / 2, self._h * np.sqrt(0.5 * LOST * self._energy / self._off), TURN / self._rate)
+        enough = min(self._h / 2, self._h * np.sqrt(0.5 * ENERGY_DRIFT_WARNING * self._energy / self._off), TURN / self._rate)
         return (
             f"free_rod: the energy of the centre line is conserved, but at t = {self._when:g} it is {self._worst:.4g} and not "
             f"{self._energy:.4g}: dt = {self._h:g} is too long and the run may not be trusted; dt = {enough:.2g} should do"

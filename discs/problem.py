@@ -1,4 +1,4 @@
-"""What is to be computed: a chain, where it starts, and for how long."""
+"""A problem: a chain of discs, its initial state, its loads and the time to simulate."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -19,15 +19,15 @@ from discs.skew import Load, Phase
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where the discs are and how fast they roll; velocities follow from rolling.
+    """Positions, angles and rates of the discs. The velocities of the contact points follow from rolling.
 
     Attributes
     ----------
     x, y : contact points, (n,), length.
     theta : roll angles, (n,), rad.
-    omega : rates of roll, (n,), rad per time; a number stands for all.
+    omega : rates of roll, (n,), rad per time; a number holds for all discs.
     phi : own headings, (n,), rad, for a `SteeredChain`; None for a `Chain`.
-    phi_rate : rates of turning, (n,), rad per time; a number stands for all.
+    phi_rate : rates of turning, (n,), rad per time; a number holds for all discs.
     """
 
     x: ArrayLike
@@ -50,16 +50,17 @@ class Problem:
 
     Attributes
     ----------
-    chain : the discs and springs.
+    chain : the discs and their springs.
     initial : state at t = 0.
     duration : time to simulate, > 0.
-    loads : what acts besides the springs and the ground, see `discs.loads`; they add up. Energy is not conserved then, and runs are
-        not warned of it.
+    loads : forces besides those of springs and ground, see `discs.loads`; they are added. Energy is then not conserved, and no
+        warning compares it.
 
     Raises
     ------
-    ValueError : if the state has another number of discs, lacks headings or has too many, the duration is not positive, or a
-        disc has neither inertia nor a heading to roll along (something would be divided by zero).
+    ValueError : if the state has another number of discs than the chain, or headings where the chain has none (or none where it
+        needs them); if the duration is not positive; or if a disc has neither inertia nor a heading to roll along, so that its
+        equation would divide by zero.
     """
 
     chain: Chain | SteeredChain
@@ -82,7 +83,7 @@ class Problem:
             self._check_inertia(np.asarray(self.chain.radius) > 0, "radius = 0")
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Problems are sent to other processes as what they were made from."""
+        """Pickle the arguments only: other processes build the system again."""
         return Problem, (self.chain, self.initial, self.duration, self.loads)
 
     def _check_loads(self) -> None:
@@ -136,9 +137,9 @@ class Problem:
 
     @cached_property
     def blown_up(self) -> float:
-        """Blow-up threshold: ten times the conserved energy, which kinetic energy cannot exceed as V >= 0; none with loads.
+        """Blow-up threshold of the kinetic energy: ten times the conserved energy; infinite with loads.
 
-        Far below one unit of twist is rounding.
+        V >= 0, so kinetic energy cannot exceed the conserved energy. The small constant keeps rounding at rest below it.
         """
         if self.loads:
             return np.inf
@@ -148,17 +149,17 @@ class Problem:
 
     @cached_property
     def ill_posed(self) -> str:
-        """What to warn of where discs without bending stiffness roll, or will, by a law that feels stretch; empty if none.
+        """The warning for a chain without bending stiffness under a law of rolling that depends on stretch; empty if there is none.
 
         With K = 0 the straight rod rolling at the rate omega amplifies waves of length 2 pi/q at the rate sigma = u q, where
         M u^4 + (beta - gamma alpha R^2 omega^2) u^2 = gamma beta R^2 omega^2 with gamma = `stretching(law)`, 1 under the field law
         (docs/model.md, `continuum.dispersion`): a Hadamard instability. Discs of spacing k cut it
-        off at sigma <= R omega/k, so runs with more discs do not converge to anything.
+        off at sigma <= R omega/k, so runs with more and more discs do not converge.
         """
         chain = self.chain
         if not isinstance(chain, Chain) or np.any(chain.bending_stiffness) or not stretching(chain.rolling_law):
             return ""
-        if not np.any(chain.radius) or self.energy() <= 0:  # what has no energy never moves
+        if not np.any(chain.radius) or self.energy() <= 0:  # without energy nothing moves
             return ""
         rate = np.max(np.asarray(chain.radius) * np.abs(self.initial.omega)) / chain.k
         now = f", at the start up to {rate:.3g} per unit of time" if rate > 0 else ""

@@ -1,4 +1,4 @@
-"""The one door to a run: `simulate(problem, method, ...)`."""
+"""`simulate(problem, method, ...)`: run a problem with an integrator."""
 
 import time as clock
 from collections.abc import Callable, Iterable, Mapping
@@ -28,7 +28,7 @@ from discs.warn import warn
 MOST_STEPS = 2.0**53
 ENGINES = ("compiled", "plain")
 Result = TypeVar("Result")
-LOST = 0.01  # of the energy: a run is warned of
+ENERGY_DRIFT_WARNING = 0.01  # relative
 
 
 def simulate(
@@ -44,38 +44,38 @@ def simulate(
 ) -> Solution:
     """Run a problem.
 
-    With neither method nor dt nor tol it is "auto" to a tolerance of 1e-3, and a warning where that is not reached.
+    Without method, dt and tol, "auto" runs to a tolerance of 1e-3 and warns if it is not reached.
 
     Parameters
     ----------
-    problem : what to compute.
-    method : name of an integrator (`discs.integrators.METHODS`; docs/choosing.md says which when), one with its own settings, as
-        `Midpoint(sweeps=2)`, or "auto". None takes "midpoint" if dt is given, otherwise "auto".
-    dt : time step, at most the duration; for SciPy's methods the longest. None takes `suggest_dt(problem, method)`.
-    frames : how many frames, equally spaced over the duration, or their times, increasing. A frame between two steps is
-        reached by a shorter step of its own, so asking for frames never changes the trajectory.
-    want : what else to record: "velocity", "slope", "contact_force", and what the method offers (leapfrog: "modified_energy").
-    progress : show a progress bar on anything that takes over a second.
-    tol : instead of dt: runs with smaller and smaller steps until x, y, theta (and phi) are within this, relative to the
-        largest value of each, or, as {"omega": 1e-4}, the quantities named; see `discs.running.tolerance`.
-    checkpoint : a file, as "run.nc", that frames are written to as they come, in bounded memory. If it is there, the run that it
-        holds goes on where it was interrupted, to the same bits as one unbroken run; see docs/archives.md. With tol (or "auto", or
-        nothing) method and step are found first, by runs of at most 101 frames in memory; a run that goes on has those of its file.
-    engine : "compiled", or "plain" for the same in NumPy and SciPy. Discs with true curvature have only the plain form.
+    problem : the chain, its initial state, loads and duration.
+    method : name of an integrator (`discs.integrators.METHODS`; docs/choosing.md helps to choose), an integrator with settings, as
+        `Midpoint(sweeps=2)`, or "auto". None is "midpoint" if dt is given, otherwise "auto".
+    dt : time step, at most the duration; for SciPy's methods the longest step. None is `suggest_dt(problem, method)`.
+    frames : number of frames, equally spaced over the duration, or their times, increasing. A frame between two steps is
+        computed by a shorter step of its own, so frames never change the trajectory.
+    want : further quantities to record: "velocity", "slope", "contact_force", and those that the method offers (leapfrog:
+        "modified_energy").
+    progress : show a progress bar for runs of more than a second.
+    tol : tolerance, instead of dt: steps are shortened until the errors of x, y, theta (and phi), relative to the largest value of
+        each, are within it. A dictionary, as {"omega": 1e-4}, names the quantities; see `discs.running.tolerance`.
+    checkpoint : a file, as "run.nc", to which frames are written as they are computed, in bounded memory. If it exists, its run
+        continues where it was interrupted, to the same bits as one unbroken run; see docs/archives.md. With a tolerance, method and
+        step are found first, by runs of at most 101 frames in memory; a run that continues takes them from its file.
+    engine : "compiled", or "plain" for NumPy and SciPy. Discs with true curvature have only the plain form.
 
     Returns
     -------
-    Solution with exactly the frames asked for. A warning says where more than a hundredth of the energy was lost or gained, where
-    steps did not converge, and where dt is so long that positions or angles are off by more than a twentieth
-    (`discs.running.step_error`).
+    Solution with exactly these frames. A run warns if its energy drifts by more than a hundredth, if steps did not converge, and if
+    the estimated error of positions or angles is above a twentieth (`discs.running.step_error`).
 
     Raises
     ------
-    ValueError : for an unknown method or quantity, a step that is not positive or longer than the duration, or frames outside it;
-        for a checkpoint that holds another run or something else.
-    KeyboardInterrupt : on Ctrl-C; with a checkpoint between two steps, and all so far is kept.
-    SimulationError : as soon as the kinetic energy exceeds ten times the total energy of the start, which no exact
-        motion does, something is not finite, or (rolling="unit") a disc loses its heading; where `tol` is not reached.
+    ValueError : for an unknown method or quantity; for a step that is not positive or longer than the duration; for frames outside
+        the duration; for a checkpoint that holds another run or something else.
+    KeyboardInterrupt : on Ctrl-C; with a checkpoint between two steps, and everything up to there is kept.
+    SimulationError : if the kinetic energy exceeds ten times the initial total energy (no exact motion does), if a value is not
+        finite, if a disc loses its heading (rolling="unit"), or if `tol` is not reached.
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
@@ -92,11 +92,11 @@ def simulate(
 
 
 def doubted(problem: Problem, run: Solution) -> str:
-    """What to warn of where a run is not to be trusted; empty where it may be."""
+    """The warning for a run that may not be trusted; empty if there is none."""
     method = run.stats["method"]
     said = lost_energy(problem, method, run.t, run.energy)
     stats = run.stats
-    doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # most runs are not, and a call does little else
+    doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # first, as it is cheap and most runs pass
     if doubtful and (reasons := doubts(stats)):
         said += (
             f"{' ' if said else ''}{method}: {'; '.join(reasons)}: the run may not be trusted; take {cure(run.stats)}, or tol=1e-3"
@@ -114,7 +114,7 @@ def _search(
     tol: float | Mapping[str, float] | None,
     checkpoint: str | Path | None,
 ) -> tuple[Solution, str]:
-    """A run to a tolerance, and what to warn of. Arguments as of `simulate`."""
+    """A run to a tolerance, and its warning or "". The arguments are those of `simulate`."""
 
     def run(problem: Problem, integrator: Integrator, dt: float, times: Float) -> Solution:
         return _run(problem, integrator, dt, times, want, progress, engine, None, False)
@@ -140,10 +140,10 @@ def _search(
 
 
 def lost_energy(problem: Problem, method: str, t: Float, energy: Float) -> str:
-    """What to warn of where energies (F,) at times (F,) say that a run is not the motion it should be; empty where it may be."""
+    """The warning if energies (F,) at times (F,) drift from the initial one by more than ENERGY_DRIFT_WARNING; else empty."""
     off = np.abs(energy - problem.energy())
     worst = int(off.argmax())
-    if off[worst] <= LOST * problem.blown_up / 10:
+    if off[worst] <= ENERGY_DRIFT_WARNING * problem.blown_up / 10:
         return ""
     return (
         f"{method}: energy is conserved, but at t = {t[worst]:g} it is {energy[worst]:.3g} and not {problem.energy():.3g}: the run "
@@ -166,7 +166,7 @@ def _run(
 ) -> Solution:
     """One run; the arguments are those of `simulate`.
 
-    checked : look at the error of the steps. more : what else `stats` tells. estimate : of the error, if it is known.
+    checked : estimate the error of the steps. more : further entries of `stats`. estimate : of the errors, if known.
     """
     want = () if want == () else wanted(want, integrator.offers)
     wished = checks.choice("engine", engine, ENGINES) == "compiled"
@@ -214,7 +214,7 @@ def _run(
                 if checkpoint is not None:
                     record.pause(f, march)
             frame = partial(observed, march, rest, want, bool(offered))
-            record.write(f, _uncut(frame, record, f, march))  # not kept here: the next step needs the room
+            record.write(f, _uncut(frame, record, f, march))  # not kept in a variable: the next step needs the memory
             if checkpoint is not None:
                 record.pause(f + 1, march)
         work = march.work
@@ -230,7 +230,7 @@ def _run(
 
 
 def _uncut(call: Callable[[], Result], record: Rows, f: int, march: March) -> Result:
-    """What a call returns; where Ctrl-C cuts it short, and does not raise, it is made again unless the run ends before frame f."""
+    """The result of a call, repeated where Ctrl-C cuts it short without an exception, unless the run ends before frame f."""
     while True:
         try:
             return call()
@@ -239,7 +239,7 @@ def _uncut(call: Callable[[], Result], record: Rows, f: int, march: March) -> Re
 
 
 class Progress:
-    """A progress bar that is made only when a run has lasted a second: making one costs as much as a short run."""
+    """A progress bar, created after a second: creating one costs as much as a short run."""
 
     def __init__(self, name: str, total: int) -> None:
         self._name, self._total, self._started = name, total, clock.perf_counter()
@@ -253,7 +253,7 @@ class Progress:
             self._bar.close()
 
     def update(self, step: int) -> None:
-        """Show that a run has come to a step."""
+        """Show the number of steps taken."""
         if self._bar is not None:
             self._bar.update(step - self._bar.n)
         elif clock.perf_counter() - self._started > 1:

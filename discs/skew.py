@@ -1,16 +1,16 @@
 r"""The contract between mechanics and integrators: q' = C(q) pi, pi' = -C(q)^T (grad V(q) - f(t, q, q')).
 
-The columns of C span the velocities that the constraints allow, scaled so that C^T M C = 1 for the mass matrix M; pi are the rates
-along them. The constraint holds identically. Without loads f, H = |pi|^2/2 + V(q) is constant because the two factors C are each
-other's transpose. `discs.chains.slaved` and `discs.chains.steered` are chains in this form; the derivations stand there.
-`continuum.galerkin` is the field.
+The columns of C span the velocities that the constraints allow, scaled so that C^T M C = 1 for the mass matrix M; the momenta pi
+are the rates along them. The constraint holds identically. Without loads f, H = |pi|^2/2 + V(q) is constant, because one factor C
+is the transpose of the other. `discs.chains.slaved` and `discs.chains.steered` derive this form for chains,
+`continuum.galerkin` for the field.
 
-A configuration q is an array (rows, n), one row for each coordinate of a disc. All that V and C need of it is its *shape*: the
-differences between neighbours, and headings where a disc has its own. Shapes are formed from both parts of the positions.
+A configuration q is an array (rows, n), one row for each coordinate of a disc. V and C depend on its *shape* only: the
+differences between neighbours, and the headings of steered discs. Shapes are formed from both parts of the positions, hi and lo.
 
 Energy-exact steps need the mean force between two configurations, a discrete gradient D with D . (q_1 - q_0) = V(q_1) - V(q_0). V
-is half a sum of stiffness times strain squared; if the strains' changes are written as s_1 - s_0 = B (q_1 - q_0) with a
-secant matrix B, then D = B^T (stiffness) (s_0 + s_1)/2 is one.
+is half a sum of stiffness times strain squared. Let B be a secant matrix, s_1 - s_0 = B (q_1 - q_0) for the strains s. Then
+D = B^T (stiffness) (s_0 + s_1)/2 is a discrete gradient.
 """
 
 from abc import ABC, abstractmethod
@@ -21,7 +21,7 @@ import numpy as np
 
 from discs.arrays import Float
 
-# Each system has its own: integrators only hand them on
+# Every system has its own types for these; integrators only pass them on
 Shape: TypeAlias = Any
 Basis: TypeAlias = Any
 Secant: TypeAlias = Any
@@ -29,7 +29,7 @@ Parameters: TypeAlias = Any  # a NamedTuple for compiled code; None if there is 
 
 
 class Placed(Protocol):
-    """What has positions hi + lo, (rows, n)."""
+    """Any object with positions hi + lo, (rows, n)."""
 
     @property
     def hi(self) -> Float: ...
@@ -42,7 +42,7 @@ class Phase(NamedTuple):
     """A point of phase space: positions as an unevaluated sum of two doubles, and momenta.
 
     hi, lo : (rows, n); q = hi + lo with lo below half a unit in the last place of hi.
-    pi : (n,), or (2, n) with own headings, rates along the columns of C.
+    pi : (n,), or (2, n) with own headings, momenta: rates along the columns of C.
     """
 
     hi: Float
@@ -51,7 +51,7 @@ class Phase(NamedTuple):
 
 
 def add(hi: Float, lo: Float, increment: Float) -> tuple[Float, Float]:
-    """Add an increment to hi + lo without losing its low digits (Knuth's two-sum)."""
+    """The sum of hi + lo and an increment, low digits kept (Knuth's two-sum)."""
     term = increment + lo
     total = hi + term
     part = total - hi
@@ -63,8 +63,8 @@ class Load(ABC):
 
     Attributes
     ----------
-    damping, stiffness : (rows, n), what f loses for each unit of v and of q, as far as it is linear and acts disc by disc. Implicit
-        steps take these parts into their matrix; the forces themselves are all in `force`.
+    damping, stiffness : (rows, n), minus the derivatives of f by v and by q, of its linear part that acts disc by disc. Implicit
+        steps add them to their matrix. `force` is the whole of f, these parts included.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
     """
 
@@ -73,7 +73,7 @@ class Load(ABC):
 
     @abstractmethod
     def force(self, t: float, q: Float, v: Float) -> Float:
-        """f at a time, of positions and velocities (rows, n), (rows, n)."""
+        """f, (rows, n), at the time t, positions q (rows, n) and velocities v (rows, n)."""
 
     @property
     def parameters(self) -> Parameters:
@@ -81,15 +81,15 @@ class Load(ABC):
 
 
 class SkewGradient(ABC):
-    """Equations q. = C(q) pi, pi. = -C(q)^T (grad V(q) - f(t, q, q.)): all that integrators need to know.
+    """The equations q. = C(q) pi, pi. = -C(q)^T (grad V(q) - f(t, q, q.)), as integrators use them.
 
     Attributes
     ----------
-    n : number of discs, or of functions that a field is made of.
+    n : number of discs, or of basis functions of a field.
     rows : names of the rows of q.
-    scale : (rows,), the size of a motion: a length, and a radian.
-    quadratic : whether V is quadratic, so that secants do not depend on the step.
-    load : f, or None, and then nothing is computed of it.
+    scale : (rows,), unit of each coordinate for tolerances: a length, or a radian.
+    quadratic : whether V is quadratic; secants then do not depend on the step.
+    load : f, or None for none; then nothing is computed for it.
     """
 
     n: int
@@ -100,7 +100,7 @@ class SkewGradient(ABC):
 
     @abstractmethod
     def shape(self, hi: Float, lo: Float | None = None) -> Shape:
-        """The shape of positions hi + lo: what C and V depend on."""
+        """The shape of positions hi + lo."""
 
     @abstractmethod
     def moved(self, shape: Shape, dq: Float) -> Shape:
@@ -108,7 +108,7 @@ class SkewGradient(ABC):
 
     @abstractmethod
     def basis(self, shape: Shape) -> Basis:
-        """C, as `forward`, `back` and `solve` take it."""
+        """The basis C, in the form that `forward`, `back` and `solve` take."""
 
     @abstractmethod
     def forward(self, c: Basis, p: Float) -> Float:
@@ -120,11 +120,11 @@ class SkewGradient(ABC):
 
     @abstractmethod
     def potential(self, shape: Shape) -> float:
-        """V."""
+        """V at a shape."""
 
     @abstractmethod
     def secant(self, shape: Shape, dq: Float) -> Secant:
-        """What depends on a step dq (rows, n) from a shape: the mean geometry that `mean_force` and `solve` need."""
+        """The mean geometry of a step dq (rows, n) from a shape, for `mean_force` and `solve`."""
 
     @abstractmethod
     def mean_force(self, secant: Secant) -> Float:
@@ -134,14 +134,14 @@ class SkewGradient(ABC):
     def solve(self, secant: Secant, c: Basis, g: complex, rhs: Float, d: complex = 0.0) -> Float:
         """Solve (I + d C^T D C + g C^T S C) p = rhs for p, of the shape of pi.
 
-        S = B^T (stiffness) B and the load's stiffness, D its damping.
+        S is B^T (stiffness) B plus the load's stiffness; D is the load's damping.
         """
 
     @final
     def pull(self, c: Basis, gradient: Float, t: float, z: Phase, move: Float | float, p: Float) -> Float:
-        """C^T (gradient - f), of the shape of pi: minus the rate of pi.
+        """Minus the rate of pi: C^T (gradient - f), of the shape of pi.
 
-        f is taken at the time t, at the positions of z after a move (rows, n), with velocities C p.
+        f is evaluated at the time t, at the positions of z after a move (rows, n), with velocities C p.
         """
         if self.load is None:
             return self.back(c, gradient)
@@ -155,17 +155,17 @@ class SkewGradient(ABC):
     def _no_step(self) -> Float:
         return np.zeros((len(self.rows), self.n))
 
-    # Several configurations, the stages of a step; here one after the other, a system may take them at once
+    # Several configurations, as the stages of a step: here one by one; a system may override these with one array operation
 
     def bases(self, shape: Shape, moves: Float) -> Basis:
         """C after each of `moves` (stages, rows, n)."""
         return [self.basis(self.moved(shape, move)) for move in moves]
 
     def forwards(self, bases: Basis, p: Float) -> Float:
-        """C p of each, (stages, rows, n)."""
+        """C p at each stage, (stages, rows, n)."""
         return np.array([self.forward(c, stage) for c, stage in zip(bases, p, strict=True)])
 
     def pulls(self, bases: Basis, shape: Shape, t: Float, z: Phase, moves: Float, p: Float) -> Float:
-        """C^T (grad V - f) at times t (stages,), after each of `moves` from z, of the shape of p."""
+        """C^T (grad V - f) at times t (stages,) after each of `moves` from z; of the shape of p."""
         stages = zip(bases, t, moves, p, strict=True)
         return np.array([self.pull(c, self.gradient(self.moved(shape, m)), time, z, m, own) for c, time, m, own in stages])

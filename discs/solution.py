@@ -1,6 +1,6 @@
-"""What a run returns.
+"""The result of a run: frames of the motion, and the statistics of the run.
 
-It plots, views and saves itself: pictures and files stand above this module, and are imported when one of these methods is called.
+Its methods for pictures and files import `discs.pictures` and `discs.files` when they are called, as these import this module.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 class Solution:
     """A motion at F frames of N discs (or of a field on N nodes). Time is the first axis, discs are the last.
 
-    `run[10:20]`, `run[::5]`, `run[run.t > 2]` is the same run at fewer frames; `run.state(frame)` starts another one.
+    `run[10:20]`, `run[::5]` and `run[run.t > 2]` are the same run at fewer frames. `run.state(frame)` is a state to start another
+    run from.
 
     Attributes
     ----------
@@ -38,9 +39,9 @@ class Solution:
     omega : (F, N), rates of roll, rad per time.
     energy : (F,), kinetic and potential energy.
     rolling_residual : (F,), largest |r. - e omega| over the discs, length per time, of the method's own velocities: zero up to
-        rounding. (Methods in (q, pi) form r. from e omega; that their steps roll is |r_{n+1} - r_n - e (theta_{n+1} - theta_n)| = 0
+        rounding. (Methods in (q, pi) compute r. as e omega. Their steps roll if |r_{n+1} - r_n - e (theta_{n+1} - theta_n)| = 0
         with e at the midpoint.) None for an extrapolated field.
-    stats : what was done: method, order, dt and where it came from, steps, work, seconds; see `discs.running.stats.Stats`.
+    stats : method, order, dt, steps, work, seconds and more; see `discs.running.stats.Stats`.
     phi, phi_rate : (F, N), own headings, rad, and their rates, rad per time; only of discs that have them.
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
@@ -48,8 +49,8 @@ class Solution:
         per time squared; want "contact_force".
     tension : (F, n_links), the multiplier p in the links of a free rod, force; of `continuum.free_rod`.
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
-    problem : what was computed, for discs; for a field of "richardson" that on the finest mesh, otherwise None.
-    error_estimate : for a field, {"x", "y", "theta", "omega"} -> estimated largest error over nodes and frames.
+    problem : the problem of discs; of a field by "richardson", the one on the finest mesh; otherwise None.
+    error_estimate : estimated largest error over discs (or nodes) and frames, by quantity; None if it was not estimated.
     """
 
     t: Float
@@ -83,7 +84,7 @@ class Solution:
         )
 
     def __getitem__(self, frames: slice | Float | Sequence[int]) -> "Solution":
-        """The run at some of its frames, in order of time: a slice, a mask (F,) or numbers of frames."""
+        """The run at some of its frames, in order of time. They are given by a slice, a mask (F,) or frame numbers."""
         try:
             picked = np.arange(self.t.size)[frames]
         except (IndexError, TypeError, ValueError):
@@ -100,10 +101,11 @@ class Solution:
     __iter__ = None  # a run is no sequence of frames
 
     def state(self, frame: int = -1) -> State:
-        """Where the discs are at a frame and how fast they roll and turn, all that the motion goes on from.
+        """The state at a frame, from which another run can start.
 
-        `Problem(run.problem.chain, run.state(), duration)` goes on from the last frame, whatever the chain. (To the same bits goes
-        `simulate(checkpoint=)`: frames do not hold what a method remembers between steps.) Of a field, the state of its nodes.
+        `Problem(run.problem.chain, run.state(), duration)` continues from the last frame, for every chain. The bits differ from
+        those of one longer run, as frames do not hold the memory of a method; `simulate(checkpoint=)` continues to the same bits.
+        For a field it is the state of the nodes.
 
         Parameters
         ----------
@@ -111,8 +113,8 @@ class Solution:
 
         Raises
         ------
-        ValueError : if there is no such frame, for a free rod, whose velocities do not follow from rolling, and for own headings
-            from an old archive that lacks their rates.
+        ValueError : if there is no such frame; for a free rod, whose velocities do not follow from rolling; and for own headings
+            from an old archive without their rates.
         """
         frames = self.t.size
         if not -frames <= (i := checks.whole("frame", frame, -frames)) < frames:
@@ -132,37 +134,37 @@ class Solution:
         return State(self.x[i], self.y[i], self.theta[i], self.omega[i], self.phi[i], self.phi_rate[i])
 
     def plot(self, *panels: str, ax: "Axes | Iterable[Axes] | None" = None) -> "list[Axes]":
-        """A first look at the run: all panels, or those named; see `discs.pictures.figures.first_look`."""
+        """Plot standard panels of the run, all or those named; see `discs.pictures.figures.first_look`."""
         from discs.pictures import figures
 
         return figures.first_look(self, panels, ax)
 
     def plot_motion(self, ax: "Axes | None" = None, **style: Any) -> "Axes":
-        """The centre line and the discs from above at several times; see `discs.pictures.figures.motion`."""
+        """Plot the centre line and the discs from above at several times; see `discs.pictures.figures.motion`."""
         from discs.pictures import figures
 
         return figures.motion(self, ax, **style)
 
     def animate(self, path: str | Path, fps: float = 25, progress: bool = True, **style: Any) -> Path:
-        """A movie, .mp4 or .gif, of the discs as they roll, one picture a frame; see `discs.pictures.animation.animate`."""
+        """Write a movie of the rolling discs, .mp4 or .gif, one picture per frame; see `discs.pictures.animation.animate`."""
         from discs.pictures.animation import animate
 
         return animate(self, path, fps, progress, **style)
 
     def view(self, path: str | Path | None = None, beside: "Solution | None" = None, **style: Any) -> "View":
-        """A page to turn and play the run in three dimensions, alone or beside another; see `discs.pictures.view.view`."""
+        """An interactive page with the run in three dimensions, alone or beside another; see `discs.pictures.view.view`."""
         from discs.pictures.view import view
 
         return view(self, path, beside, **style)
 
     def save(self, path: str | Path) -> None:
-        """Write the run to a NetCDF-4 file, read again by `discs.load`; see docs/archives.md."""
+        """Write the run to a NetCDF-4 file, which `discs.load` reads; see docs/archives.md."""
         from discs.files import archive
 
         archive.save(self, path)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """The run as a dataset with dimensions (time, disc), units and names."""
+        """The run as an xarray dataset with dimensions (time, disc), units and long names."""
         from discs.files import archive
 
         return archive.to_xarray(self)

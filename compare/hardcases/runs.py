@@ -17,7 +17,7 @@ from discs import Problem, SimulationError, Solution, simulate, suggest_dt
 from discs.arrays import Float
 from discs.integrators import Integrator
 from discs.running.tolerance import USUAL, NotReached, to_tolerance
-from discs.simulation import LOST
+from discs.simulation import ENERGY_DRIFT_WARNING
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")
@@ -27,7 +27,7 @@ PEERS = ("SciPy Radau", "SciPy BDF", "SciPy DOP853", "CVODE BDF-5")
 TOL, RTOL = 1e-4, 1e-6  # of "auto", and of the peers
 SEARCHED = {"auto": TOL, "default": USUAL}  # "default" is `simulate(problem)` with nothing set
 WRONG = 0.05  # relative error of positions, angles or energy that needs a warning
-LOOSE = LOST  # a run is lost if its relative error of the energy exceeds this
+LOOSE = ENERGY_DRIFT_WARNING  # a run is lost if its relative error of the energy exceeds this
 FRAMES = 101
 REFERENCES = 1000, 4000, 16_000  # steps of "gauss8", of which two runs must agree to KNOWN
 KNOWN = 1e-3

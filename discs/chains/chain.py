@@ -10,9 +10,9 @@ from discs.arrays import Float
 from discs.chains import links, stencils
 from discs.chains.rolling import ROLLING, RollingLaw
 
-SHORTEST = 1e-60  # spacing whose fourth power, with stiffness and inertia, is a double by far
+SHORTEST = 1e-60  # spacing; its fourth power, times stiffness or inertia, does not underflow
 FEWEST = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}
-WHY = {
+WHY = {  # the reason for `FEWEST`
     "springs": "a bend needs two neighbours",
     "paper": "a bend needs two neighbours",
     "consistent": "the ghost disc beyond an end takes four",
@@ -40,7 +40,7 @@ class Spaced:
 
     @property
     def w(self) -> Float:
-        """Length each disc stands for, (n,)."""
+        """Share of the length of each disc, (n,)."""
         return stencils.shares(self.n, self.k, self.ends)
 
 
@@ -48,8 +48,8 @@ class Spaced:
 class Chain(Spaced):
     """A chain of `n` vertical discs that roll without sliding, with bending and torsion springs between them.
 
-    Disc i stands at s_i = i k on the straight chain and for a share w_i of its length; its mass is rho w_i and its moment
-    of inertia about the axle alpha w_i. The springs store
+    On the straight chain disc i is at s_i = i k. Its share of the length is w_i, its mass rho w_i and its moment of inertia about
+    the axle alpha w_i. The springs store
 
         V = sum_links beta/(2k) (theta_{i+1} - theta_i)**2 + sum_bends K k/2 |r''_i|**2,
 
@@ -60,18 +60,18 @@ class Chain(Spaced):
     Parameters
     ----------
     n : number of discs, at least 3 (4 with consistent ends, 5 on a ring).
-    length : length of the rod that the chain stands for, > 0.
+    length : length of the rod, > 0.
     density : rho, mass per length, > 0; a number or one per disc (n,).
     spin_inertia : alpha, moment of inertia about the axle per length, >= 0; a number or (n,).
     torsion_stiffness : beta >= 0; a number or one per link (n-1,), (n,) on a ring.
     bending_stiffness : K >= 0; a number or one per bend, (n-2,), (n,) on a ring and with consistent ends.
-    radius : R >= 0; a number or (n,). A disc of radius 0 keeps its place and only twists.
+    radius : R >= 0; a number or (n,). A disc of radius 0 does not move, it only twists.
     rolling : "field" or "unit".
-    curvature : "linear", bending energy K/2 |r''|**2, the paper's; "true", K/2 phi'**2 with phi the direction of the line,
-        which does not see stretch. The ends carry no bend in the true law, whose natural condition is phi' = 0.
+    curvature : "linear", bending energy K/2 |r''|**2, the paper's; or "true", K/2 phi'**2 with phi the direction of the line,
+        independent of stretch. With "true" the ends have no bending spring: the natural condition is phi' = 0.
     stretch_stiffness : A >= 0, energy A/2 (|r'| - 1)**2 of links; a number or one per link. Only with the true curvature.
-    ends : "springs", "consistent", "paper" (as "springs", end discs of full weight) or "ring".
-    shift : r advances by this on one turn of a "ring": (0, 0) closes it, (length, 0) makes a straight periodic rod.
+    ends : "springs", "consistent", "paper" (as "springs", with end discs of full weight) or "ring".
+    shift : advance of r over one period of a "ring": (0, 0) for a closed ring, (length, 0) for a straight periodic rod.
 
     Any consistent unit system may be used.
 
@@ -113,17 +113,17 @@ class Chain(Spaced):
 
     @property
     def rolling_law(self) -> RollingLaw:
-        """The law of rolling that `rolling` names."""
+        """The law of rolling."""
         return ROLLING[self.rolling]
 
     @property
     def link_law(self) -> type[links.LinkLaw]:
-        """The link law that `curvature` names."""
+        """The link law."""
         return links.CURVATURE[self.curvature]
 
     @property
     def bend_shares(self) -> Float:
-        """Length each bend stands for, (n_bends,)."""
+        """Share of the length of each bend, (n_bends,)."""
         return stencils.bend_shares(self.n, self.k, self._bend_ends)
 
     @property
@@ -133,10 +133,10 @@ class Chain(Spaced):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SteeredChain(Spaced):
-    """A chain of `n` vertical rolling discs that each have a heading of their own, joined by flexible beams.
+    """A chain of `n` vertical rolling discs with headings of their own, joined by flexible beams.
 
-    A disc's configuration is (x, y, theta, phi), phi the direction of its axle; it rolls along J (cos phi, sin phi). A link between
-    neighbours resists stretch, shear, torsion and bending; see `discs.chains.steered` for the energy.
+    The configuration of a disc is (x, y, theta, phi), with phi the direction of its axle. It rolls along J (cos phi, sin phi).
+    A link between neighbours resists stretch, shear, torsion and bending; see `discs.chains.steered` for the energy.
 
     Parameters
     ----------
@@ -147,8 +147,8 @@ class SteeredChain(Spaced):
     stretch_stiffness : A >= 0, force per stretch; a number or one per link.
     shear_stiffness : G >= 0, force per shear angle; a number or one per link.
     ends : "springs" or "ring".
-    shift : r advances by this on one turn of a "ring".
-    turns : whole turns that the heading makes on one turn of a "ring": 1 for a circle, 0 for a straight periodic rod.
+    shift : advance of r over one period of a "ring".
+    turns : whole turns of the heading over one period of a "ring": 1 for a circle, 0 for a straight periodic rod.
 
     Raises
     ------
@@ -192,7 +192,7 @@ class SteeredChain(Spaced):
 
 
 def _settle(chain: "Chain | SteeredChain", **ranges: tuple[int, bool]) -> None:
-    """Check length, shift and the parameters per disc, link or bend (size, must be positive), and store them as arrays."""
+    """Check length, shift and the parameters (each with its size, and whether it must be positive), and store them as arrays."""
     object.__setattr__(chain, "length", checks.number("length", chain.length, positive=True))
     if not SHORTEST < chain.k < 1 / SHORTEST:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""What every chain of rolling discs is; see `discs.skew` for the form of its equations."""
+"""The base class of chains of rolling discs; `discs.skew` gives the form of their equations."""
 
 from abc import abstractmethod
 from functools import cached_property
@@ -11,16 +11,16 @@ from discs.skew import Parameters, Placed, Secant, Shape, SkewGradient
 
 
 class RollingDiscs(SkewGradient):
-    """The equations of motion of a chain. A basis is the entries of C, (rows, n).
+    """The equations of motion of a chain. A basis is the array of entries of C, (rows, n).
 
     Attributes
     ----------
-    rows : names of the coordinates of a disc, "x", "y", "theta" and, with own headings, "phi".
-    weights : (rows, n), inertia of each disc against each coordinate's rate.
+    rows : names of the coordinates of a disc: "x", "y", "theta" and, with own headings, "phi".
+    weights : (rows, n), inertia of each disc for each coordinate.
     closed : whether the chain is a ring.
-    reach : how many discs to either side a disc's rates depend on.
+    reach : the rates of a disc depend on so many discs to either side.
     vanishing : whether a heading can vanish.
-    stiffest : bound of the entries of C^T (grad^2 V) C, per time squared.
+    stiffest : upper bound of the entries of C^T (grad^2 V) C, per time squared.
     """
 
     weights: Float
@@ -38,11 +38,11 @@ class RollingDiscs(SkewGradient):
 
     @abstractmethod
     def slope(self, shape: Shape) -> Float:
-        """The headings: the slope r' of the centre line (slaved), or (cos phi, sin phi); (2, n)."""
+        """The headings, (2, n): the slope r' of the centre line (slaved headings), or (cos phi, sin phi) (own headings)."""
 
     @abstractmethod
     def contact(self, shape: Shape) -> Float:
-        """Contact directions e, (2, n): a disc moves by e per unit of roll. Length per rad."""
+        """Contact directions e, (2, n): r. = e omega. Length per rad."""
 
     @abstractmethod
     def contact_rate(self, shape: Shape, v: Float) -> Float:
@@ -50,11 +50,11 @@ class RollingDiscs(SkewGradient):
 
     @abstractmethod
     def momentum(self, shape: Shape, rates: Float) -> Float:
-        """pi of the rates of roll (row 0) and, with own headings, of turning (row 1)."""
+        """pi from the rates of roll (row 0) and, with own headings, of turning (row 1)."""
 
     @abstractmethod
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
-        """A disc whose heading vanished between two configurations, or None."""
+        """A disc whose heading vanishes between two configurations, or None."""
 
     def kinetic(self, v: Float) -> float:
         """Kinetic energy of rates (rows, n)."""
@@ -64,11 +64,11 @@ class RollingDiscs(SkewGradient):
 
     @abstractmethod
     def stiffness(self, secant: Secant, c: Float) -> Float:
-        """Upper bands (width + 1, unknowns) of C^T B^T (stiffness) B C, as LAPACK stores them, unknowns in `order`."""
+        """Upper bands (width + 1, unknowns) of C^T B^T (stiffness) B C, as LAPACK stores them; unknowns in `order`."""
 
     @abstractmethod
     def polarised(self, shape: Shape, other: Shape) -> float:
-        """The symmetric bilinear form of which V is the square; ValueError unless V is quadratic."""
+        """The symmetric bilinear form V(q, q') with V(q, q) = V(q); ValueError unless V is quadratic."""
 
     def contact_force(self, shape: Shape, v: Float, f: Float | float = 0.0) -> Float:
         """Force lambda of the ground on each disc, (2, n), for admissible rates v (rows, n) and loads f (rows, n).
@@ -93,15 +93,16 @@ class RollingDiscs(SkewGradient):
     @property
     @abstractmethod
     def order(self) -> Int | None:
-        """Order in which the unknowns of pi are taken in banded systems; None as they stand."""
+        """Order of the unknowns pi in banded systems; None for the natural order."""
 
     @cached_property
     def _inverse_order(self) -> Int | None:
         return None if self.order is None else np.argsort(self.order)
 
     def solve(self, secant: Secant, c: Float, g: complex, rhs: Float, d: complex = 0.0) -> Float:
-        """In O(n): for g > 0 by banded Cholesky, for a complex g by banded elimination. In double precision whatever that of
-        `rhs`, which is enough for a correction: a state in `longdouble` is carried on in extended precision.
+        """In O(n): for g > 0 by banded Cholesky, for a complex g by banded elimination.
+
+        Always in double precision. That is enough for a correction, also to a state in extended precision (`longdouble`).
         """
         matrix = g * self.stiffness(secant, c)
         matrix[-1] += 1
@@ -113,14 +114,14 @@ class RollingDiscs(SkewGradient):
         flat = rhs.ravel() if self.order is None else rhs.ravel()[self.order]
         if np.iscomplexobj(matrix):
             width, n = len(matrix) - 1, matrix.shape[1]
-            full = np.zeros((3 * width + 1, n), complex, order="F")  # `width` more rows above for the exchange of pivots
+            full = np.zeros((3 * width + 1, n), complex, order="F")  # `width` more rows above for pivoting
             for j in range(width + 1):
                 full[2 * width - j, j:] = full[2 * width + j, : n - j] = matrix[width - j, j:]
             _, _, p, info = scipy.linalg.lapack.zgbsv(width, width, full, flat, overwrite_ab=True)
         else:
             _, p, info = scipy.linalg.lapack.dpbsv(matrix, flat, overwrite_ab=True)
         if info:
-            p = np.full(flat.size, np.nan)  # not positive definite: C is not finite, or all digits are lost
+            p = np.full(flat.size, np.nan)  # not positive definite: C is not finite, or rounding dominates
         if self._inverse_order is not None:
             p = p[self._inverse_order]
         found: Float = p.reshape(rhs.shape)
@@ -128,11 +129,11 @@ class RollingDiscs(SkewGradient):
 
 
 class Assembly:
-    """Adds the small matrices of springs up to the bands of one symmetric matrix.
+    """Assembles the small matrices of springs into the bands of one symmetric matrix.
 
     Parameters
     ----------
-    places : (springs, m), the places of the unknowns that each spring joins, in the order of the banded system.
+    places : (springs, m), indices in the banded system of the unknowns that each spring joins.
     """
 
     def __init__(self, *places: Int) -> None:
@@ -143,10 +144,9 @@ class Assembly:
         self._slots = np.concatenate([((self.width + 1) * high + self.width - (high - low)).ravel() for low, high in ends])
 
     def __call__(self, *strains: tuple[Float, Float]) -> Float:
-        """Bands of the sum of B^T (stiffness) B, (width + 1, size).
+        """Bands (width + 1, size) of the sum of B^T (stiffness) B over the springs.
 
-        Each argument belongs to one of `places`: rows B of its strains, (springs, strains, m), and their stiffness,
-        (springs, strains).
+        One argument for each of `places`: the rows B of the strains, (springs, strains, m), and the stiffness, (springs, strains).
         """
         entries = []
         for (b, stiffness), (i, j) in zip(strains, self._pairs, strict=True):
@@ -157,7 +157,7 @@ class Assembly:
 
 
 def folded(n: int) -> Int:
-    """The order 0, n-1, 1, n-2, ... of a ring, in which neighbours are at most two places apart: rings are banded too."""
+    """The order 0, n-1, 1, n-2, ... of a ring: neighbours are at most two places apart, so the matrix is banded."""
     order = np.empty(n, dtype=int)
     order[0::2] = np.arange((n + 1) // 2)
     order[1::2] = np.arange(n - 1, (n - 1) // 2, -1)

@@ -26,8 +26,8 @@ from discs.skew import Load, Parameters, Placed, Secant
 
 
 class SlavedSystem(RollingDiscs):
-    """The equations of motion of a `Chain`; a shape is its links, (3, n_links). The springs are those of
-    `discs.chains.links`, and e is that of a law in `discs.chains.rolling`."""
+    """The equations of motion of a `Chain`. A shape is its links, (3, n_links); `discs.chains.links` gives V,
+    `discs.chains.rolling` gives e."""
 
     rows = ("x", "y", "theta")
 
@@ -76,7 +76,7 @@ class SlavedSystem(RollingDiscs):
         return rate
 
     def inertia(self, e: Float) -> Float:
-        """Inertia m = w (alpha + rho |e|**2) of each disc against rolling, (n,)."""
+        """Inertia of each disc for rolling, m = w (alpha + rho |e|**2), (n,)."""
         m: Float = self.weights[2] + self.weights[0] * (e[0] ** 2 + e[1] ** 2)
         return m
 
@@ -99,7 +99,7 @@ class SlavedSystem(RollingDiscs):
         return pi
 
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
-        """Where headings can vanish: a disc whose r' comes below `LOST_HEADING` on the straight way between two configurations."""
+        """A disc whose |r'| falls below `LOST_HEADING` on the straight line between two configurations, or None."""
         if not self.vanishing:
             return None
         a, b = (self.slope(self.shape(z.hi, z.lo)) for z in (before, after))

@@ -1,12 +1,12 @@
-r"""Discs with their own heading phi: the chain of N wheels, each the vertical rolling disc of the textbooks.
+r"""Discs with their own headings phi: a chain of N vertical rolling discs, as in textbooks.
 
 Disc i (share of length w) has mass rho w, spin inertia alpha w and heading inertia J w, an axle along d_1 = (cos phi, sin phi), and
-rolls along J d_1: r. = e theta. with e = R (-sin phi, cos phi). With |e| = R and F_q = -dV/dq Lagrange-d'Alembert gives
+rolls along J d_1: r. = e theta. with e = R (-sin phi, cos phi). As |e| = R, Lagrange-d'Alembert gives, with F_q = -dV/dq,
 
     (alpha + rho R^2) w theta.. = e . F_r + F_theta,   J w phi.. = F_phi,
 
-no term in e.e. = 0: constant inertia, no gyroscopic forces. C has two columns for a disc, (e, 1, 0)/sqrt((alpha + rho R^2) w) and
-(0, 0, 1)/sqrt(J w) in (x, y, theta, phi).
+since e.e. = 0: the inertia is constant, and there are no gyroscopic forces. C has two columns for a disc,
+(e, 1, 0)/sqrt((alpha + rho R^2) w) and (0, 0, 1)/sqrt(J w) in (x, y, theta, phi).
 
 Strains of a link, with d = r_{i+1} - r_i, mean heading m = (phi_i + phi_{i+1})/2 and T(m) the turn by m:
 
@@ -16,10 +16,10 @@ V = sum_links k/2 (A Gamma_1^2 + G Gamma_2^2 + beta torsion^2 + K bending^2). Ov
 
     Gamma_1 - Gamma_0 = cos(delta/2) T(-mu) D/k - delta sinc(delta/2) J T(-mu) M/k
 
-exactly, with mu and M the means of m and d: the secant of Gamma in closed form.
+exactly, with mu and M the means of m and d. This is the secant of Gamma in closed form.
 
-Free ends of the limit, the planar Simo-Reissner rod rho r.. = n' + lambda, J phi.. = K phi'' + r' x n, alpha theta.. = beta theta''
-- e.lambda, follow from the admissible variations: K phi' = 0 and e.n + beta theta' = 0.
+Free ends of the limit N -> infinity, the planar Simo-Reissner rod rho r.. = n' + lambda, J phi.. = K phi'' + r' x n,
+alpha theta.. = beta theta'' - e.lambda, follow from the admissible variations: K phi' = 0 and e.n + beta theta' = 0.
 """
 
 from functools import cached_property
@@ -81,7 +81,7 @@ class SteeredSystem(RollingDiscs):
     # Kinematics
 
     def _middle(self, phi: Float, close: float) -> Float:
-        """Means of neighbours; around a ring the closing one is taken with the turns made."""
+        """Means of neighbours; on a ring the last mean takes the whole turns `close` into account."""
         if self._ends != "ring":
             middle: Float = 0.5 * (phi[1:] + phi[:-1])
         else:
@@ -180,7 +180,7 @@ class SteeredSystem(RollingDiscs):
 
     @cached_property
     def order(self) -> Int:
-        """Roll and heading of a disc side by side, discs in their (folded) order."""
+        """Roll and heading of a disc side by side; discs in natural order, on a ring in `folded` order."""
         discs = folded(self.n) if self._ends == "ring" else np.arange(self.n)
         return np.stack([discs, discs + self.n], axis=1).ravel()
 

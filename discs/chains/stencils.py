@@ -1,11 +1,11 @@
-"""Finite differences along a chain, taken of its links.
+"""Finite differences along a chain, computed from its links.
 
-A link is the difference of neighbouring discs, d_i = r_{i+1} - r_i; on a ring the last one closes it. Everything
-the springs and the headings need is a combination of links, and forming them first keeps rounding small: second and
-fourth differences of positions of order 1 would lose k**2 and k**4 of their digits, differences of links do not.
+A link is the difference of neighbouring discs, d_i = r_{i+1} - r_i; on a ring the last link joins the last disc to the first. The
+strains of the springs and the headings are combinations of links. Links are computed first to keep rounding small: second and
+fourth differences of positions of order 1 have relative errors of rounding over k**2 and k**4, differences of links do not.
 
-Kinds of ends: "springs" (plain), "paper" (the same springs; the end discs weigh more, see `shares`), "consistent" (end discs bear
-a spring too), "ring" (none). Beyond each free end lies a ghost disc, see `extended`.
+Kinds of ends: "springs" (plain), "paper" (the same springs, heavier end discs, see `shares`), "consistent" (bending springs at the
+end discs too) and "ring" (no ends). Beyond each free end there is a ghost disc, see `extended`.
 """
 
 import numpy as np
@@ -21,9 +21,9 @@ def spacing(n: int, length: float, ends: str) -> float:
 
 
 def shares(n: int, k: float, ends: str) -> Float:
-    """Length that each disc stands for, (n,): k, and k/2 at free ends.
+    """Share of the length of each disc, (n,): k, and k/2 at free ends.
 
-    The paper gives its end discs the full k: the rod is then k longer than it should be, an error of first order.
+    The paper's end discs have the full k: its rod is longer by k, an error of first order.
     """
     w = np.full(n, k)
     if ends in ("springs", "consistent"):
@@ -51,10 +51,10 @@ def pull(tension: Float, ends: str) -> Float:
 
 
 def extended(d: Float, ends: str) -> Float:
-    """Links with one more at each end, (..., n_links) -> (..., n + 1): the i-th lies before disc i, the next one after it.
+    """Links with one more at each end, (..., n_links) -> (..., n + 1): link i is before disc i, link i + 1 after it.
 
-    Around a ring the closing link is the first and the last. Beyond a free end lies a ghost disc, at "springs" and "paper" ends
-    r_{-1} = 3 r_0 - 3 r_1 + r_2, at "consistent" ones r_{-1} = 4 r_0 - 6 r_1 + 4 r_2 - r_3.
+    On a ring the closing link is both the first and the last. Beyond a free end there is a ghost disc: r_{-1} = 3 r_0 - 3 r_1 + r_2
+    for "springs" and "paper", r_{-1} = 4 r_0 - 6 r_1 + 4 r_2 - r_3 for "consistent".
     """
     if ends == "ring":
         return np.concatenate([d[..., -1:], d], axis=-1)
@@ -69,7 +69,7 @@ def extended(d: Float, ends: str) -> Float:
 
 
 def gathered(tension: Float, ends: str) -> Float:
-    """The transpose of `extended`, (..., n + 1) -> (..., n_links): what pulls at a ghost link pulls at those it is made of."""
+    """The transpose of `extended`, (..., n + 1) -> (..., n_links): the tension of a ghost link acts on the links that define it."""
     if ends == "ring":
         own = tension[..., 1:].copy()
         own[..., -1] += tension[..., 0]
@@ -84,9 +84,9 @@ def gathered(tension: Float, ends: str) -> Float:
 def slopes(d: Float, k: float, ends: str) -> Float:
     """Headings r' at the discs from the links, (..., n_links) -> (..., n).
 
-    Inside, and with the ghosts everywhere, r'_i = (r_{i+1} - r_{i-1})/2k. At an end
+    r'_i = (r_{i+1} - r_{i-1})/2k, at the ends with the ghost discs. That is, at an end,
     "springs", "paper": (-3 r_0 + 4 r_1 - r_2)/2k;
-    "consistent": (-4 r_0 + 7 r_1 - 4 r_2 + r_3)/2k, whose truncation error k**2 r'''/6 is the inner one.
+    "consistent": (-4 r_0 + 7 r_1 - 4 r_2 + r_3)/2k, with the same truncation error k**2 r'''/6 as inside.
     """
     longer = extended(d, ends)
     return (longer[..., 1:] + longer[..., :-1]) / (2 * k)
@@ -95,13 +95,13 @@ def slopes(d: Float, k: float, ends: str) -> Float:
 def bends(d: Float, ends: str) -> Float:
     """k**2 r'' at the discs from the links, (..., n_links) -> (..., n): k**2 r''_i = r_{i+1} - 2 r_i + r_{i-1}.
 
-    With "consistent" ends that is 2 r_0 - 5 r_1 + 4 r_2 - r_3 at an end; "springs" and "paper" have no spring there.
+    At a "consistent" end that is 2 r_0 - 5 r_1 + 4 r_2 - r_3; "springs" and "paper" have no bending spring there.
     """
     return np.diff(extended(d, ends))
 
 
 def bend_bands(stiffness: Float, ends: str) -> Float:
-    """B^T (stiffness) B for B that takes discs to `bends`, (4, n): [j, i] couples discs i and i + j, around a ring n and 0 too.
+    """B^T (stiffness) B for B from positions to `bends`, (4, n): [j, i] couples discs i and i + j (modulo n on a ring).
 
     stiffness : (n,), zero where there is no spring.
     """
@@ -122,7 +122,7 @@ def bend_bands(stiffness: Float, ends: str) -> Float:
 
 
 def bend_shares(n: int, k: float, ends: str) -> Float:
-    """Length that each bend stands for, (n_bends,): k, and k/2 for the end bends of "consistent"."""
+    """Share of the length of each bend, (n_bends,): k, and k/2 for the end bends of "consistent"."""
     w = np.full(n if ends in ("ring", "consistent") else n - 2, k)
     if ends == "consistent":
         w[[0, -1]] = k / 2

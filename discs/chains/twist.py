@@ -1,4 +1,4 @@
-"""The paper's rod and its twist, as discs: what a run starts from when nothing else is given."""
+"""The paper's twisted rod as a chain of discs: the default scene."""
 
 from typing import Any
 
@@ -31,20 +31,20 @@ def twisted(s: Float, length: float, amplitude: float) -> tuple[Float, Float, Fl
 def untwisting_chain(
     n: int, rolling: str = "field", ends: str = "springs", duration: float = DURATION, twist: float = TURNS, **parameters: Any
 ) -> Problem:
-    """n discs in a straight line at rest, twisted by theta = -pi twist cos(pi s/length), let go: the paper's scene.
+    """The paper's scene: n discs in a straight line, at rest, twisted by theta = -pi twist cos(pi s/length).
 
     Parameters
     ----------
     n : number of discs.
     rolling : a name in `discs.chains.rolling`, "field" or "unit", or "own" for discs with a heading of their own.
     ends : of a `Chain`; "springs" for own headings.
-    duration : time.
+    duration : time to simulate.
     twist : turns between the two ends.
-    parameters : of the chain; the paper's by default, and for own headings J = 0.25, A = G = 10.
+    parameters : of the chain; by default the paper's, with J = 0.25 and A = G = 10 for own headings.
 
     Raises
     ------
-    ValueError : for an unknown parameter or one out of its range.
+    ValueError : for an unknown parameter, or a value outside its range.
     """
     own = checks.choice("rolling", rolling, (*ROLLING, "own")) == "own"
     standard = PAPER | STEERED if own else PAPER

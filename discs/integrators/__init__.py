@@ -1,4 +1,4 @@
-"""The integrators, one file each, found by name: a method is any class in these files that has a `name`."""
+"""The integrators, one file each: every class in these files with a `name` is a method."""
 
 import ast
 import pkgutil
@@ -28,7 +28,7 @@ METHODS = _methods()
 
 
 def find(method: str | Integrator) -> Integrator:
-    """The integrator of a name, with its default settings; an integrator is returned as it is."""
+    """The integrator of a name, with default settings; an integrator is returned unchanged."""
     if not isinstance(method, str) and isinstance(method, Integrator):
         return method
     return _standard(checks.choice("method", method, METHODS))
@@ -36,12 +36,12 @@ def find(method: str | Integrator) -> Integrator:
 
 @cache
 def _standard(name: str) -> Integrator:
-    """The integrator of a name; one for all runs, as it is frozen."""
+    """The integrator of a name: one object for all runs, as it is frozen."""
     return METHODS[name]()
 
 
 def from_settings(text: str) -> Integrator:
-    """The integrator that a run was made with, from its settings as `stats` tells them; ValueError if it is none."""
+    """The integrator of a run, from the entry `settings` of its stats; ValueError if the text is no integrator."""
 
     def build(node: ast.expr) -> Any:
         known = {cls.__name__: cls for cls in METHODS.values()}

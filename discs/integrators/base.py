@@ -1,4 +1,4 @@
-"""What every integrator is: a small frozen object with a name, an order, a reference and a step."""
+"""Base classes of integrators: small frozen objects with a name, an order, a reference and a step."""
 
 import signal
 from abc import ABC, abstractmethod
@@ -15,13 +15,13 @@ from discs.skew import Parameters, Phase
 
 @dataclass
 class Work:
-    """What a run has cost so far.
+    """The cost of a run so far.
 
     Attributes
     ----------
     gradients : evaluations of grad V.
     solves : banded linear systems.
-    unconverged : implicit steps that ended on their limit of sweeps.
+    unconverged : implicit steps that reached their limit of sweeps.
     """
 
     gradients: int = 0
@@ -29,15 +29,18 @@ class Work:
     unconverged: int = 0
 
     def add(self, tally: "Tally") -> None:
-        """Count what a compiled run has cost."""
+        """Add the cost of compiled steps."""
         self.gradients += tally.gradients
         self.solves += tally.solves
         self.unconverged += tally.unconverged
 
 
 class Tally(NamedTuple):
-    """What a compiled run of steps reports: steps taken, its work, and a disc that lost its heading or -1; how many looks were
-    passed, and whether it stopped before one that is doubted; whether the kinetic energy is not below the bound."""
+    """The result of compiled steps.
+
+    steps, gradients, solves, unconverged : steps taken, and their cost. lost : a disc that lost its heading, or -1.
+    passed : looks done. doubted : whether a step to be compared comes next. blown : whether the kinetic energy exceeds the bound.
+    """
 
     steps: int
     gradients: int
@@ -49,20 +52,20 @@ class Tally(NamedTuple):
     blown: bool
 
 
-Memory: TypeAlias = Any  # what a method keeps between steps, of its own kind
-Looks = tuple[int, Int, Float, Float, float]  # what `discs.kernels.driver` is told of them
+Memory: TypeAlias = Any  # a NamedTuple or an object: all that a method needs between steps, of a type of its own
+Looks = tuple[int, Int, Float, Float, float]  # arguments of `discs.kernels.driver.march`
 NO_LOOKS: Looks = 0, np.empty(0, np.int64), np.empty((1, 1, 0)), np.empty((1, 2, 1)), np.inf
 
 
 class Cut(Exception):
-    """A compiled call that Ctrl-C cut short; what it did is dropped, and the memory is that from before."""
+    """Ctrl-C interrupted a compiled call. Its steps are dropped; the memory is the one before the call."""
 
 
 class Frame(NamedTuple):
     """Positions q = hi + lo and their rates of change, all (rows, n).
 
-    lost : a disc that a compiled step on the way saw losing its heading, or -1; then the rest is undefined.
-    seen : q, energy and largest slip, where the compiled form found them on the way.
+    lost : a disc that lost its heading in the compiled step to the frame, or -1. If there is one, the rest is undefined.
+    seen : q, energy and largest slip, if the compiled form computed them.
     """
 
     hi: Float
@@ -73,18 +76,18 @@ class Frame(NamedTuple):
 
 
 class Integrator(ABC):
-    """A method of integration: of fixed steps, `FixedStep`, or of steps of its own choice.
+    """A method of integration, with fixed steps (`FixedStep`) or adaptive ones.
 
     Attributes
     ----------
     name : as given to `simulate(method=...)`.
     order : declared order in the step; the tests measure it.
-    preserves : what it keeps, in words.
-    reference : where it comes from.
+    preserves : the invariants and symmetries that it keeps, in words.
+    reference : the publication.
     stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
-    offers : names of extra quantities it can report per frame, see `extras`.
-    takes_loads : whether it computes what acts besides the springs.
-    adaptive : whether it chooses its own steps; then h, in what follows, is the longest it may take.
+    offers : names of further quantities at frames, see `extras`.
+    takes_loads : whether it can be used with loads.
+    adaptive : whether it chooses its own steps; below, h is then the longest step.
     """
 
     name: ClassVar[str]
@@ -99,71 +102,71 @@ class Integrator(ABC):
     @final
     @cached_property
     def settings(self) -> str:
-        """What `stats` tells of it."""
+        """The entry `settings` of `stats`."""
         return repr(self)
 
     @property
     @abstractmethod
     def compiles(self) -> bool:
-        """Whether it has a compiled form, or takes the chain's in a form of its own; else it runs on the plain engine."""
+        """Whether it can use the compiled form of a chain; otherwise it runs on the plain engine."""
 
     @abstractmethod
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> Memory:
-        """What the method must remember between steps of size h, at the first time.
+        """The memory of the method at t = 0, for steps of size h.
 
-        `chain`, here and below, are the parameters for the compiled form, `system.parameters`; None for the plain one.
+        `chain`, here and below: `system.parameters` for the compiled form, None for the plain form.
         """
 
     @abstractmethod
     def advance(self, system: RollingDiscs, memory: Memory, t: float, h: float, work: Work) -> Memory:
-        """The memory one step h later than t."""
+        """The memory one step h after the time t."""
 
     @abstractmethod
     def at(
         self, system: RollingDiscs, memory: Memory, t: float, tau: float, h: float, work: Work, chain: Parameters = None
     ) -> Frame:
-        """The discs a time 0 <= tau < h after the last step (of size h) to t; the trajectory is not touched."""
+        """The discs at t + tau, 0 <= tau < h, with t the time of the last step; the trajectory does not change."""
 
     @abstractmethod
     def kinetic(self, system: RollingDiscs, memory: Memory, h: float) -> float:
-        """Kinetic energy at the last step; for a two-step method, half a step later."""
+        """Kinetic energy after the last step; for a two-step method, half a step later."""
 
     @abstractmethod
     def keep(self, memory: Memory) -> dict[str, Any]:
-        """The memory as arrays and numbers by name, all that `recall` needs to go on bit for bit."""
+        """The memory as arrays and numbers by name, from which `recall` restores it to the same bits."""
 
     @abstractmethod
     def recall(self, memory: Memory, kept: dict[str, Any]) -> Memory:
-        """The memory that was kept; `memory` is that of `begin`, of the same run."""
+        """The memory from what `keep` returned; `memory` is that of `begin` for the same run."""
 
     def finer(self, system: RollingDiscs, memory: Memory, t: float, h: float, chain: Parameters = None) -> Float | None:
-        """Positions (rows, n) one step h later, of an error several times smaller, for `discs.running.step_error`.
+        """Positions (rows, n) one step h later with an error several times smaller, for `discs.running.step_error`.
 
-        None: steps are checked as they are taken.
+        None if the method controls the error of its steps itself.
         """
         return None
 
     @property
     def sweep_tolerance(self) -> float:
-        """What its sweeps converge to; 0 where it has no sweeps, or a fixed number of them."""
+        """The tolerance of its sweeps; 0 if it has no sweeps or a fixed number of them."""
         return 0.0
 
     def with_sweeps(self, tolerance: float) -> "Integrator":
-        """The same method with its sweeps converged to a tolerance; itself where it has no sweeps, or a fixed number of them."""
+        """The same method with this tolerance of sweeps; itself if it has no sweeps or a fixed number of them."""
         return self
 
     def extras(self, system: RollingDiscs, memory: Memory, h: float) -> dict[str, float]:
-        """The quantities in `offers`, at the last step."""
+        """The quantities in `offers`, after the last step."""
         return {}
 
 
 class FixedStep(Integrator):
-    """A method of equal steps.
+    """A method with equal steps.
 
     Attributes
     ----------
-    parameters : what `discs.kernels.driver` is given for the compiled twin, a NamedTuple whose kind has a `step` filled in; None if
-        there is none, and runs then take the plain form.
+    parameters : the NamedTuple of the compiled twin, whose type `step` of `discs.kernels.protocol` is filled in for. None if there
+        is none: runs then take the plain form.
     """
 
     adaptive: ClassVar[bool] = False
@@ -183,12 +186,12 @@ class FixedStep(Integrator):
     ) -> tuple[Memory, Tally]:
         """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.parameters`.
 
-        Stops after a step whose kinetic energy is not below `bound`, and after one in which a disc loses its heading; the returned
-        state is then undefined. Raises `Cut` on Ctrl-C, heard in every sweep, where Python's handler of it does not raise itself.
+        Stops after a step whose kinetic energy exceeds `bound`, and after one in which a disc loses its heading; the returned
+        state is then undefined. Ctrl-C is polled in every sweep; `Cut` is raised if Python's handler of it does not raise.
         """
         import discs.kernels.driver as driver
 
-        state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta of roll alone are one row there
+        state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta (n,) are (1, n) in compiled code
         tally = Tally(*driver.march(self.parameters, chain, state, t, h, steps, bound, *looks))
         if tally.steps < 0:
             signal.raise_signal(signal.SIGINT)
@@ -197,11 +200,11 @@ class FixedStep(Integrator):
 
 
 class OneStep(FixedStep):
-    """A method whose step needs the state alone: the memory is the state, and frames are reached by a shorter step."""
+    """A one-step method: its memory is the state, and a frame between steps is computed by a shorter step."""
 
     @abstractmethod
     def step(self, system: RollingDiscs, z: Phase, t: float, h: float, work: Work) -> Phase:
-        """The state a step h after z at the time t, a pure function of its arguments (work is counted up)."""
+        """The state a step h after z at the time t: a pure function of its arguments, apart from counting `work`."""
 
     @final
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> Phase:

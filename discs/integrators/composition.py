@@ -15,16 +15,16 @@ from discs.skew import Phase, SkewGradient
 
 @dataclass(frozen=True)
 class Composition(OneStep, ABC):
-    """Midpoint steps of fractions of h, the same forwards and backwards. On stiff modes, h much larger than their period,
-    the order is lower.
+    """Midpoint steps of symmetric fractions of h. The order is lower for stiff modes, whose period is much shorter than h.
 
     Parameters
     ----------
-    base : the midpoint method that is composed.
+    base : the midpoint method of the substeps.
 
     Attributes
     ----------
-    fractions : they sum to 1; their cubes, and for order 6 their fifth powers and one more condition, vanish.
+    fractions : of h, one per midpoint step. Their sum is 1, the sum of their cubes 0; order 6 needs two more conditions, of which
+        one is that the sum of their fifth powers is 0.
     """
 
     base: Midpoint = field(default_factory=Midpoint)
@@ -71,8 +71,8 @@ KAHAN_LI = (0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935
 
 
 class KahanLi6(Composition):
-    """Nine midpoint steps, the longest fraction 0.80: of the nine-stage compositions of order 6 the one of least error
-    coefficient that Kahan and Li found."""
+    """Nine midpoint steps, the longest fraction 0.80: the composition of order 6 with nine stages and the least error coefficient
+    of those that Kahan and Li found."""
 
     name: ClassVar[str] = "kahanli6"
     order: ClassVar[int] = 6

@@ -1,4 +1,4 @@
-"""SciPy's integrators on the reduced equations, to compare with and for tolerances by step control."""
+"""SciPy's integrators on the reduced equations: for comparisons, and for step control by local tolerances."""
 
 from abc import ABC
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from discs.skew import Parameters, Phase
 
 
 class Reduced:
-    """The reduced equations q. = C pi, pi. = -C^T (grad V - f) as y. = f(t, y), disc by disc: y = (x, y, theta, pi, ...) of disc 0,
-    then 1 …
+    """The reduced equations q. = C pi, pi. = -C^T (grad V - f) as y. = f(t, y). y lists (x, y, theta, pi) of disc 0, of disc 1, …
+    (with own headings x, y, theta, phi and both momenta).
 
     Parameters
     ----------
     system : the chain.
-    chain : `system.parameters` for the compiled form, None for the plain one.
+    chain : `system.parameters` for the compiled form, None for the plain form.
     """
 
     def __init__(self, system: RollingDiscs, chain: Parameters = None) -> None:
@@ -31,11 +31,11 @@ class Reduced:
         self.each: int = self.rows + columns(self.rows)  # unknowns of a disc
 
     def join(self, q: Float, pi: Float) -> Float:
-        """y of positions (rows, n) and momenta."""
+        """y from positions (rows, n) and momenta."""
         return np.concatenate([q, np.atleast_2d(pi)]).T.ravel()
 
     def split(self, y: Float) -> Phase:
-        """Positions and momenta of y."""
+        """Positions and momenta from y."""
         state = y.reshape(self.n, -1).T
         q, pi = np.ascontiguousarray(state[: self.rows]), np.ascontiguousarray(state[self.rows :])
         return Phase(q, np.zeros_like(q), pi if len(pi) > 1 else pi[0])
@@ -55,11 +55,11 @@ class Reduced:
 
     @property
     def width(self) -> int:
-        """Half the bandwidth of the Jacobian of f, of an open chain."""
+        """Half the bandwidth of the Jacobian of f for an open chain."""
         return (self.system.reach + 1) * self.each - 1
 
     def sparsity(self) -> "scipy.sparse.csc_array":
-        """Where the Jacobian of f may differ from zero."""
+        """The sparsity pattern of the Jacobian of f."""
         n, reach = self.n, self.system.reach
         offsets = [j for j in range(-reach, reach + 1) if abs(j) < n]
         if self.system.closed:
@@ -70,14 +70,14 @@ class Reduced:
 
 @dataclass(frozen=True)
 class SolveIvp(Integrator, ABC):
-    """A method of `scipy.integrate.solve_ivp` on y = (q, pi): steps of its own choice, no longer than dt; frames are interpolated.
+    """A method of `scipy.integrate.solve_ivp` on y = (q, pi), with adaptive steps of at most dt; frames are interpolated.
 
-    It keeps nothing but what its tolerances keep (the rolling constraint holds identically in these variables).
+    Energy is conserved only to the tolerances. The rolling constraint holds identically in these variables.
 
     Parameters
     ----------
-    rtol, atol : tolerances of a step's error, relative to |y| and absolute; pi of a disc is small like the root of its share
-        of length.
+    rtol, atol : tolerances of the error of a step, relative to |y| and absolute. (pi of a disc goes like the root of its share of
+        length.)
     """
 
     rtol: float = 1e-6
@@ -97,7 +97,7 @@ class SolveIvp(Integrator, ABC):
         return True
 
     def options(self, f: Reduced) -> dict[str, Any]:
-        """What the method is told about the Jacobian."""
+        """The options of the solver about the Jacobian."""
         return {}
 
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> "Course":
@@ -133,14 +133,14 @@ class SolveIvp(Integrator, ABC):
 
 
 class Course:
-    """A running SciPy solver, seen at a time: it steps ahead as far as it is asked to and is interpolated."""
+    """A running SciPy solver and its interpolated state at a time."""
 
     def __init__(self, f: Reduced, solver: "scipy.integrate.OdeSolver", time: float, z: Phase) -> None:
         self.f, self.solver, self.time = f, solver, time
         self.hi, self.lo, self.pi = z
 
     def to(self, time: float, work: Work) -> "Course":
-        """The same solver at a later time."""
+        """The same solver, stepped ahead as needed, and its state at a later time."""
         while self.solver.t < time:
             message = self.solver.step()
             if self.solver.status == "failed":
@@ -164,7 +164,7 @@ class DOP853(SolveIvp):
 
 
 class Radau(SolveIvp):
-    """Radau IIA of order 5; implicit, damps what its steps do not resolve."""
+    """Radau IIA of order 5; implicit, damps unresolved oscillations."""
 
     name: ClassVar[str] = "Radau"
     order: ClassVar[int] = 5
@@ -174,7 +174,7 @@ class Radau(SolveIvp):
 
 
 class BDF(SolveIvp):
-    """Backward differences of orders 1 to 5; from order 3 on unstable for oscillations, so slow for many discs."""
+    """Backward differences of orders 1 to 5. Orders above 2 are unstable for oscillations, so it is slow for many discs."""
 
     name: ClassVar[str] = "BDF"
     order: ClassVar[int] = 5
@@ -184,7 +184,7 @@ class BDF(SolveIvp):
 
 
 class LSODA(SolveIvp):
-    """Adams' methods and backward differences by turns (ODEPACK)."""
+    """Adams' methods or backward differences, chosen by the solver (ODEPACK)."""
 
     name: ClassVar[str] = "LSODA"
     order: ClassVar[int] = 5

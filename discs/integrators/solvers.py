@@ -1,7 +1,7 @@
-"""What a solver of SciPy remembers between steps, as arrays and numbers, and back.
+"""Save and restore the state of a SciPy solver, as arrays and numbers.
 
-SciPy offers no such thing. Its solvers keep what they know in attributes: numbers, arrays, a sparse Jacobian, factors of a matrix
-(which are made again from the matrix, to the same bits) and the last step's interpolant (which is made again from the rest).
+SciPy has no function for this. Its solvers hold their state in attributes: numbers, arrays, a sparse Jacobian, factors of a matrix
+(computed again from the matrix, to the same bits) and the interpolant of the last step (computed again from the others).
 """
 
 from collections.abc import Callable
@@ -16,12 +16,12 @@ PARTS = ("data", "indices", "indptr")
 
 
 class Factors:
-    """Factors of a sparse matrix that know the matrix they were made from.
+    """Factors of a sparse matrix, kept with the matrix.
 
     Parameters
     ----------
-    matrix : what is factored.
-    make : matrix -> factors, as SciPy's solvers make them.
+    matrix : the matrix.
+    make : matrix -> factors, the function that SciPy's solver uses.
     """
 
     def __init__(self, matrix: "scipy.sparse.csc_matrix", make: Callable[["scipy.sparse.csc_matrix"], Any]) -> None:
@@ -34,7 +34,7 @@ class Factors:
 
 
 def keep(solver: "scipy.integrate.OdeSolver") -> dict[str, Any]:
-    """What a solver remembers; nothing of an LSODA whose memory is hidden in Fortran (SciPy before 1.17) but its time."""
+    """The state of a solver; only the time of an LSODA whose state is hidden in Fortran (SciPy before 1.17)."""
     if isinstance(solver, scipy.integrate.LSODA):
         ode = solver._lsoda_solver
         inner = ode._integrator
@@ -51,8 +51,8 @@ def keep(solver: "scipy.integrate.OdeSolver") -> dict[str, Any]:
 
 
 def recall(solver: "scipy.integrate.OdeSolver", kept: dict[str, Any]) -> None:
-    """Make a new solver of the same problem remember what another one did."""
-    if "replay" in kept:  # its steps do not depend on what they were asked for: take them again
+    """Restore the state that `keep` returned in a new solver of the same problem."""
+    if "replay" in kept:  # the steps do not depend on frames: take them again
         while solver.t < kept["replay"]:
             solver.step()
         return
@@ -77,6 +77,6 @@ def recall(solver: "scipy.integrate.OdeSolver", kept: dict[str, Any]) -> None:
 
 
 def _numbers(attributes: dict[str, Any]) -> dict[str, Any]:
-    """Arrays and numbers among attributes."""
+    """The attributes that are arrays or numbers."""
     wanted = (bool, int, float, np.ndarray, np.generic)
     return {name: np.array(value, copy=True) for name, value in attributes.items() if isinstance(value, wanted)}

@@ -1,1 +1,1 @@
-"""A run on its way: the time loop, what is recorded, the step, the error."""
+"""Runs: the time loop, frames and their recording, the suggested step, error estimates and tolerances."""

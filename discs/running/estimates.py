@@ -1,4 +1,4 @@
-"""Errors of runs with different steps: how far they are apart, the order that this shows, and what unfinished sweeps add."""
+"""Error estimates from runs with different steps: their differences, the observed order, and the part left by sweeps."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -12,33 +12,33 @@ from discs.problem import Problem, State
 from discs.skew import SkewGradient
 from discs.solution import Solution
 
-LEAST_ORDER = 0.5  # at it or below an error has stalled; no order is taken to be less
-MOST_ORDER = 2.0  # that an estimate relies on; higher ones change from run to run
-SAFETY = 1.5  # of estimates
-ROUNDED = 1e-12  # largest value of what is rounding only, in units of its scale
-SWEPT = 0.004  # of a tolerance: what sweeps may leave of it
-LEFT = 0.5  # what a step's sweeps leave, in units of their tolerance: 0.4 at most was seen, on rings, mostly a tenth of that
+LEAST_ORDER = 0.5  # lower bound of an observed order; an error of this order or less has stalled
+MOST_ORDER = 2.0  # upper bound of an order in an estimate; higher orders vary from run to run
+SAFETY = 1.5  # factor of estimates
+ROUNDED = 1e-12  # a quantity below it, in units of its scale, is rounding only
+SWEPT = 0.004  # part of a tolerance that sweeps may leave as an error
+LEFT = 0.5  # error that the sweeps of a step leave, in units of their tolerance; measured: at most 0.4 (rings), mostly 0.04
 LEFT_RATE = 10.0  # the same of a rate, in units of their tolerance over the step
-LEAST_SWEPT = 1e-16  # tolerance of sweeps: rounding
+LEAST_SWEPT = 1e-16  # least tolerance of sweeps: rounding
 
 RATES = ("omega", "phi_rate", "x_rate", "y_rate")
 DERIVED = (*RATES, "slope_x", "slope_y", "contact_force", "modified_energy")
 
 
 def differences(one: Solution, other: Solution) -> dict[str, float]:
-    """The largest difference of two runs over discs and frames, of every quantity that both record."""
+    """The largest difference of two runs over discs and frames, for every recorded quantity."""
     return {name: float(np.abs(getattr(one, name) - getattr(other, name)).max()) for name in compared(one)}
 
 
 def compared(run: Solution) -> list[str]:
-    """Names of what a run records of its motion."""
+    """Names of the quantities that a run records."""
     assert run.problem is not None
     recorded = (*run.problem.system.rows, *DERIVED, "energy")
     return [name for name in recorded if getattr(run, name) is not None]
 
 
 def sizes(run: Solution, names: Iterable[str]) -> dict[str, float]:
-    """The largest value of each quantity; its scale (length, a radian), or 1, where that is rounding only."""
+    """The largest value of each quantity; its scale (length or radian, otherwise 1) where the value is rounding only."""
     assert run.problem is not None
     scale = _scales(run.problem.system)
 
@@ -50,7 +50,7 @@ def sizes(run: Solution, names: Iterable[str]) -> dict[str, float]:
 
 
 def orders(earlier: Solution, run: Solution, finer: Solution, most: int) -> dict[str, float]:
-    """The order of each quantity's error: p of h^p from two runs, their errors measured by one with shorter steps."""
+    """The order p of each quantity's error C h^p, from two runs and a third with shorter steps as reference."""
     shorter = math.log(earlier.stats["dt"] / run.stats["dt"])
     before, after = differences(earlier, finer), differences(run, finer)
     found = {}
@@ -61,9 +61,9 @@ def orders(earlier: Solution, run: Solution, finer: Solution, most: int) -> dict
 
 
 def errors(run: Solution, finer: Solution, order: Mapping[str, float]) -> dict[str, float]:
-    """Estimates of a run's errors, largest over discs and frames, from one with shorter steps; see `discs.running.tolerance`.
+    """Estimated errors of a run, largest over discs and frames, from one with shorter steps; see `discs.running.tolerance`.
 
-    order : as it was seen, 1 where it is missing. What sweeps leave is added. The energy's error is known: what it changed by.
+    order : observed orders, 1 where one is missing. The errors left by sweeps are added. The error of the energy is its drift.
     """
     assert run.problem is not None
     ratio, more = run.stats["dt"] / finer.stats["dt"], unswept(run)
@@ -75,17 +75,17 @@ def errors(run: Solution, finer: Solution, order: Mapping[str, float]) -> dict[s
 
 
 def unswept(run: Solution) -> dict[str, float]:
-    """What the sweeps of a run may leave of positions, angles and their rates."""
+    """Errors of positions, angles and their rates that the sweeps of a run may leave."""
     assert run.problem is not None
     tolerance = from_settings(run.stats["settings"]).sweep_tolerance
     return {name: tolerance * most for name, most in left(run.problem.system, run.stats["dt"], float(run.t[-1])).items()}
 
 
 def left(system: SkewGradient, dt: float, end: float) -> dict[str, float]:
-    """What sweeps leave of positions, angles and their rates at the time `end`, in units of their tolerance.
+    """Errors of positions, angles and their rates that sweeps leave at the time `end`, in units of their tolerance.
 
-    A step's sweeps end when they change its moves by no more than their tolerance, in units of the scale. What is then missing of
-    the steps adds up, in the worst case linearly.
+    The sweeps of a step end when they change its moves by no more than their tolerance, in units of the scale. The remaining
+    errors of the steps add up, at worst linearly.
     """
     moves = {name: LEFT * end / dt * scale for name, scale in _scales(system).items()}
     length = float(system.scale[0])
@@ -94,14 +94,14 @@ def left(system: SkewGradient, dt: float, end: float) -> dict[str, float]:
 
 
 def sweeps_to(problem: Problem, bound: Mapping[str, float], size: Mapping[str, float], dt: float, end: float) -> float:
-    """The tolerance of sweeps with which they leave at most SWEPT of what the tolerances `bound` allow."""
+    """The tolerance of sweeps that leaves errors of at most SWEPT times the tolerances `bound`."""
     most = left(problem.system, dt, end)
     parts = [tol * size.get(name, 1.0) / most.get(name, LEFT_RATE * end / dt) for name, tol in bound.items()]
     return max(SWEPT * min(parts), LEAST_SWEPT)
 
 
 def nudged(problem: Problem) -> Problem:
-    """The problem from positions and angles one unit in the last place away, to either side."""
+    """The problem with initial positions and angles changed by one unit in the last place, up or down at random."""
     start, rng = problem.initial, np.random.default_rng(0)
 
     def nudge(value: Float) -> Float:

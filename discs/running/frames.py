@@ -1,4 +1,4 @@
-"""The frames of a run: when they are, how many steps come before each, and what each records."""
+"""Frames of a run: their times, the steps before each, and the recorded quantities."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -12,20 +12,20 @@ from discs.integrators.base import Frame
 from discs.running.time_loop import March
 
 WANTS = ("velocity", "slope", "contact_force")
-ROUNDING = 1e-12  # of the duration: a frame or a step so much beyond it is at its end
+ROUNDING = 1e-12  # relative to the duration: a time beyond the end by less counts as the end
 
 
 def steps_before(time: float, h: float) -> tuple[int, float]:
-    """Whole steps before a time, and the rest of the way; a time within rounding of a step is taken at the step."""
+    """The number of whole steps before a time, and the remaining time; a time within rounding of a step counts as the step."""
     steps = int(time / h * (1 + 4e-16) + 1e-9)
     rest = time - steps * h
     return steps, rest if rest > 1e-9 * h else 0.0
 
 
 def frame_times(frames: int | ArrayLike, duration: float) -> Float:
-    """The times of frames, (F,), from their number or themselves; see `simulate`.
+    """The times of frames, (F,), from their number or their times; see `simulate`.
 
-    A time outside the duration by no more than rounding, as `np.arange(0, 0.35, 0.1)` makes of 0.3, is taken at its end.
+    A time beyond the duration by no more than rounding counts as its end: `np.arange(0, 0.35, 0.1)` ends just above 0.3.
     """
     if type(frames) is int or (not isinstance(frames, (list, tuple)) and np.ndim(frames) == 0):
         count = checks.whole("frames", frames, 1, "the last state is always one")
@@ -42,7 +42,7 @@ def frame_times(frames: int | ArrayLike, duration: float) -> Float:
 
 
 def wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
-    """The quantities that frames record only when asked to; ValueError for one that neither `WANTS` nor the method `offers`."""
+    """The names in `want`, checked; ValueError for one that is neither in `WANTS` nor in `offers` of the method."""
     if want == ():
         return ()
     if not isinstance(want, Iterable):
@@ -52,7 +52,7 @@ def wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:
-    """What a frame a time tau after the last step records."""
+    """The quantities recorded at a frame, a time tau after the last step."""
     frame = march.frame(tau)
     found = march.observe(frame)
     if want:
@@ -63,7 +63,7 @@ def observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> 
 
 
 def _asked(march: March, frame: Frame, t: float, want: tuple[str, ...]) -> dict[str, Any]:
-    """What a frame records only when asked to."""
+    """The quantities in `want`, at a frame."""
     system, rate = march.system, frame.rate
     shape = system.shape(frame.hi, frame.lo)
     found: dict[str, Any] = {}

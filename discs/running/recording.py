@@ -1,8 +1,8 @@
-"""Where the frames of a run go: into memory, or into a file from which an interrupted run goes on.
+"""Storage of frames: in memory, or in a file from which an interrupted run can continue.
 
-Beside the file `run.nc` stands `run.nc.restart` while the run is not finished: what the integrator remembers, about once a second,
-in a file that replaces the one before. After a kill the run goes on from there and takes the frames since then again, to the same
-bits; see `discs.files.restart`.
+Until a run is finished, a restart file `run.nc.restart` lies beside `run.nc`. It holds the memory of the integrator and is replaced
+about once a second. A run that was killed continues from it and computes the later frames again, to the same bits; see
+`discs.files.restart`.
 """
 
 import hashlib
@@ -29,8 +29,8 @@ from discs.running.time_loop import March
 from discs.solution import Solution
 from discs.warn import warn
 
-SECONDS = 1.0  # between two restart files, and at least twenty times what writing one takes
-SETTINGS = ("settings", "dt", "engine", "want")  # of stats: what a run must share with the one it goes on from
+SECONDS = 1.0  # between two restart files, or twenty times the time of writing one if that is more
+SETTINGS = ("settings", "dt", "engine", "want")  # entries of stats that must agree for a run to continue
 
 
 class Rows:
@@ -46,15 +46,15 @@ class Rows:
     def __exit__(self, *error: object) -> None:
         pass
 
-    complete = False  # whether the run was finished before
-    seconds = 0.0  # spent on it before
+    complete = False  # whether the file holds the finished run
+    seconds = 0.0  # spent on the run by earlier calls
 
     def begin(self, march: March, first: Callable[[], dict[str, Any]]) -> int:
-        """Bring the run to where it was interrupted; returns the first frame to compute. `first()` is a frame at the start."""
+        """Restore the state of an interrupted run; returns the first frame to compute. `first()` is the frame at t = 0."""
         return 0
 
     def write(self, f: int, found: dict[str, Any]) -> None:
-        """Take frame f."""
+        """Store frame f."""
         if not self.rows:
             for name, value in found.items():
                 shape = value.shape if type(value) is np.ndarray else ()
@@ -63,27 +63,28 @@ class Rows:
             self.rows[name][f] = value
 
     def pause(self, f: int, march: March) -> None:
-        """Between steps, before frame f is written."""
+        """Called between steps, before frame f is written."""
 
     def solution(self, stats: Stats, march: March | None = None) -> Solution:
-        """The run, which has come to its end."""
+        """The finished run."""
         return Solution(t=self.times, s=self.problem.chain.s, stats=stats, problem=self.problem, **self.rows)
 
 
 class Recording(Rows):
-    """Frames in a file, which belongs to this run from the beginning to its end.
+    """Frames in a file.
 
-    The restart file is there as long as the run, empty at first, and locked: who holds it may write the other. It names its run.
+    The restart file exists as long as the run, and is empty at first. It is locked: only the process with the lock may write to
+    either file. It names its run.
 
     Parameters
     ----------
-    path : the file; made anew, or that of the same run, which then goes on.
-    about : what is known of `stats` from the start.
-    estimate : of the run's error, if it is known.
+    path : the file; a new one, or that of the same run, which then continues.
+    about : the entries of `stats` that are known at the start.
+    estimate : the error estimate of the run, if it is known.
 
     Raises
     ------
-    ValueError : on entering, if there is another run in the file, or something else, or another process writes to it.
+    ValueError : on entering, if the file holds another run or something else, or if another process writes to it.
     """
 
     def __init__(
@@ -96,8 +97,8 @@ class Recording(Rows):
         self.run = hashlib.sha256(repr(sorted(self.told.items())).encode()).hexdigest()  # names it in the restart file
         self.file: FrameFile | None = None
         self.step = 0  # of the last restart file
-        self.empty = False  # whether the file was made here, and nothing is in it yet
-        self.asked = False  # to stop
+        self.empty = False  # whether the file was created here and has no frames yet
+        self.asked = False  # whether Ctrl-C was pressed
         self.due = clock.perf_counter() + SECONDS
 
     def __enter__(self) -> "Recording":
@@ -106,14 +107,14 @@ class Recording(Rows):
         except BaseException:
             self._close()
             raise
-        # Ctrl-C is heard between steps, where the memory is whole; the second one at once
+        # the first Ctrl-C takes effect between steps, where the memory is consistent; the second one at once
         self._handler: Callable[[int, FrameType | None], object] | int | None = None
         if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             self._handler = signal.signal(signal.SIGINT, self._interrupted)
         return self
 
     def _open(self) -> None:
-        """Take the file, if it is there and of this run."""
+        """Open the file, if it exists and holds this run."""
         self.restart.take()
         if not self.path.exists():
             return
@@ -165,7 +166,7 @@ class Recording(Rows):
         return f
 
     def _create(self, found: dict[str, Any]) -> None:
-        """Make the file, with room for all frames that are as the one found."""
+        """Create the file with space for all frames, each with the quantities of the one found."""
         self.restart.clear()
         head = schema.header(self.problem, self.times, self.problem.chain.s, self.about, self.estimate, False)
         shapes = {name: np.shape(value) for name, value in found.items()}
@@ -199,7 +200,7 @@ class Recording(Rows):
             )
 
     def _keep(self, f: int, march: March, more: dict[str, Float]) -> None:
-        """Replace the restart file; its lock goes on with the new one. Where there is no room for it the run goes on."""
+        """Replace the restart file and keep its lock. If it cannot be written, the run continues with a warning."""
         seconds = self.seconds + clock.perf_counter() - self._started
         try:
             self.restart.keep({"run": self.run, "frame": f, "seconds": seconds} | march.keep() | more)
@@ -209,7 +210,7 @@ class Recording(Rows):
             self.step, self.empty = march.step, False
 
     def _goes_on(self) -> str:
-        """How a run that ends here is gone on with."""
+        """From where the same call would continue a run that ends here, in words."""
         return f"the same call goes on from {f'step {self.step}' if self.step else 'the beginning'}"
 
     def _check_place(self) -> None:
@@ -218,7 +219,7 @@ class Recording(Rows):
             raise OSError(f"{self.path} was deleted or replaced while a run wrote to it, and the run stops; its frames are lost")
 
     def solution(self, stats: Stats, march: March | None = None) -> Solution:
-        """The run, its file finished, or as it was finished before."""
+        """The finished run; its file is completed first, unless it was complete before."""
         assert self.file is not None
         if march is not None:
             self._check_place()
@@ -229,7 +230,7 @@ class Recording(Rows):
         return self.file.solution(self.problem)
 
     def _check(self, file: FrameFile) -> None:
-        """Whether the file is of the same run."""
+        """Raise ValueError unless the file holds the same run."""
         if file.problem is None:
             raise ValueError(f"{self.path} holds a field; give another path, or delete it")
         there, here = _told(file.problem, file.static["time"], file.attrs["stats"]), self.told
@@ -245,7 +246,7 @@ class Recording(Rows):
 
 
 def _told(problem: Problem, times: Float, stats: Stats) -> dict[str, str | bytes]:
-    """All that makes a run what it is, by name: a hash of each array, the rest as text."""
+    """All that identifies a run, by name: a hash of each array, the rest as text."""
     numbers, arrays = schema.describe(problem)
     told = {name: stats.get(name) for name in SETTINGS} | numbers
     return {name: schema.as_text(value) for name, value in told.items()} | {
@@ -254,9 +255,9 @@ def _told(problem: Problem, times: Float, stats: Stats) -> dict[str, str | bytes
 
 
 def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> tuple[Integrator, float, Stats] | None:
-    """Integrator and step of the run in a file, and what is known of its search, for `stats`; None if there is no file.
+    """Integrator and step of the run in a file, and its entries of `stats` about the search; None if there is no file.
 
-    ValueError if it was made for another tolerance.
+    ValueError if the run was made for another tolerance.
     """
     if not (real := archive.named(path)).exists():
         safe.check_writable(path)

@@ -1,42 +1,42 @@
-"""What a run tells of itself."""
+"""`Solution.stats`: settings, cost and error estimates of a run."""
 
 from typing import Any, TypedDict, cast
 
 
 class Stats(TypedDict, total=False):
-    """`Solution.stats`: what was done and what it took, a dictionary; a solver tells what it knows.
+    """`Solution.stats`, a dictionary: settings, cost and error estimates. A solver fills in the entries that it knows.
 
-    A file may hold more, and other kinds than these where `discs.files.untrusted` does not check them.
+    A file may hold further entries, and values of other types where `discs.files.untrusted` does not check them.
     """
 
-    # what was asked for and chosen
+    # settings
     method: str
-    order: int | None  # None where it is chosen on the way
+    order: int | None  # None where the solver varies it
     settings: str  # the integrator with all its settings, as Python writes it
     engine: str  # "compiled" or "plain"
     want: list[str]
     dt: float  # time step
-    dt_suggested: bool  # whether nobody gave it
+    dt_suggested: bool  # whether dt was chosen by `suggest_dt`
     tol: float | dict[str, float]  # the tolerance asked for
-    attempts: int  # runs that were made to reach it
-    limited_by: str  # what made the run as accurate as it is: "tolerance", "fewest steps" or "sweeps", see `running.tolerance`
+    attempts: int  # runs made to reach the tolerance
+    limited_by: str  # what determined the accuracy: "tolerance", "fewest steps" or "sweeps", see `discs.running.tolerance`
 
-    # what it took
+    # cost
     steps: int
-    short_steps: int  # those to frames between two steps; only where some did not converge
+    short_steps: int  # steps to frames between two steps; given only if some steps did not converge
     gradients: int  # evaluations of grad V
     solves: int  # banded linear systems
     iterations: int  # of Newton's method, by a peer
     seconds: float
 
-    # how far it is to be trusted
+    # trust
     unconverged: int  # steps whose sweeps did not converge
-    converging_dt: float  # a step with which they would
-    step_error: float  # estimated error of positions and angles by the steps, relative
-    frames_missing: int  # of a run that was interrupted
-    lean: float  # of a peer's wheels, rad
+    converging_dt: float  # a time step with which they converge
+    step_error: float  # estimated relative error of positions and angles due to the time step
+    frames_missing: int  # frames not written, of an interrupted run
+    lean: float  # largest lean angle of the wheels, of a peer, rad
 
-    # of a field, and of a textbook's disc
+    # of a field and of a single disc
     scene: dict[str, Any]  # name, laws, duration and parameters, see `continuum.told`
     functions: int  # of a spectral basis
     elements: int
@@ -45,5 +45,5 @@ class Stats(TypedDict, total=False):
 
 
 def of_search(stats: Stats) -> Stats:
-    """What the stats of a run tell of the search for its step."""
+    """The entries of stats about the search for a step."""
     return cast(Stats, {name: value for name, value in stats.items() if name in ("tol", "attempts", "limited_by")})

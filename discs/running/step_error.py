@@ -1,18 +1,18 @@
-r"""How far a run of fixed steps may be trusted: the error of its steps, and steps that did not converge.
+r"""The error of a run of fixed steps: the estimate `step_error`, and steps that did not converge.
 
-One to eight of a run's N steps, spread over it, are looked at; the trajectory is not touched. A look forms the defect of the step,
-|q_{n+1} - 3 q_n + 3 q_{n-1} - q_{n-2}|/12, from positions that are there anyway; it is near h^3 |q'''|/12. A midpoint step errs by
-(h w)^3/12 of an oscillation of rate w, so the defect is the error of a step of order 2. For steps of higher order it is a bound, as
-long as they resolve the motion; of what they do not resolve, the defect is as large as that itself. Errors of smooth motions add
-up: N times the mean defect, relative to the largest value of each of x, y, theta (and phi), doubled, is the estimate `step_error`.
-Runs of one or two steps have no third difference. There h^2 C (f_m - f_0)/6 stands for it, by the change of the force C^T grad V
-from the start to the middle of the step: f_m = (pi_1 - pi_0)/h.
+One to eight of a run's N steps, spread over the run, are sampled ("looks"); the trajectory does not change. A look computes the
+defect of the step, |q_{n+1} - 3 q_n + 3 q_{n-1} - q_{n-2}|/12, about h^3 |q'''|/12, from known positions. The error of a midpoint
+step is (h w)^3/12 of an oscillation of rate w, so the defect is the error of a step of order 2. For steps of higher order that
+resolve the motion it is a bound; the defect of an unresolved oscillation is as large as the oscillation. Errors of smooth motions
+add up. So `step_error` is twice N times the mean defect, relative to the largest value of each of x, y, theta (and phi). Runs of
+one or two steps have no third difference. There the defect is h^2 C (f_m - f_0)/6, from the change of the force C^T grad V between
+the start and the middle of the step, with f_m = (pi_1 - pi_0)/h.
 
-Where a look alone would make the estimate larger than 1 %, or a heading turns by more than a radian in the step, which may hide
-whole turns, the step is taken again as two of h/2, and the difference, the error of the step up to a factor 1 - 2^-p near one,
-takes the place of the defect. The estimate is then near the error of smooth motions, up to ten times too large where the errors of
-waves do not add up, and too small where the motion amplifies differences. A run of few steps and discs that is suspected even then
-is taken again with half the step, and the change (4/3 of it, the error if that goes like h^2) takes the place of the estimate.
+A step is compared if its look alone would raise the estimate above 1 %, or if a heading turns by more than a radian in it, which
+may hide whole turns: it is computed again as two steps of h/2, and their difference replaces the defect. (It is the error of the
+step up to a factor 1 - 2^-p near one.) The estimate is then near the error of smooth motions, up to ten times too large where the
+errors of waves do not add up, and too small where the motion amplifies differences. A short run whose estimate is still between the
+values SUSPECTED is computed again with half the step, and 4/3 of the change, the error if it goes like h^2, replaces the estimate.
 """
 
 import numpy as np
@@ -24,33 +24,33 @@ from discs.kernels.limits import TURNED
 from discs.running.stats import Stats
 from discs.skew import Parameters, Phase
 
-EVERY = 50  # steps, of which one is looked at
-MOST = 8  # steps looked at in a run
-FEW = 3  # steps, and there is a third difference
-SAFETY = 2.0
-DOUBTFUL = 0.01  # of the largest position or angle: an estimate below it needs no comparison
-SUSPECTED = 0.02, 1.0  # of the same: between these a run is taken again ...
-SHORT = 200_000  # ... if it has at most so many steps times discs: some hundredths of a second
-WARNED = 0.05  # of the largest position or angle: a run is warned of
-AIM = 1e-3  # relative error that a warning suggests a step for
-HALVINGS = 8  # of a step that did not converge, in search of one that does
+EVERY = 50  # steps per look
+MOST = 8  # looks in a run, at most
+FEW = 3  # least number of steps with a third difference
+SAFETY = 2.0  # factor of the estimate
+DOUBTFUL = 0.01  # relative estimate above which a step is compared
+SUSPECTED = 0.02, 1.0  # relative estimates between which a run is computed again ...
+SHORT = 200_000  # ... if steps times discs are at most this: some hundredths of a second
+WARNED = 0.05  # relative estimate above which a run warns
+AIM = 1e-3  # relative error for which a warning suggests a step
+HALVINGS = 8  # of a step that did not converge, at most
 
 
 class Watch:
-    """The error of a run's steps, on some of them.
+    """The looks at some steps of a run, and the error estimate from them.
 
     Parameters
     ----------
-    steps : how many the run takes. rows, n : shape of its positions.
+    steps : number of steps of the run. rows, n : shape of its positions.
 
     Attributes
     ----------
-    looks : (m,), the steps looked at, counted from 1. passed : how many of them were.
-    doubted : whether the step to come is looked at and is to be compared.
-    limit : the largest defect, relative to positions and angles, that needs no comparison.
-    short : whether the run may be taken again.
-    places : positions (rows, n) after each look of a short run; else room for one.
-    defects : (m, 2, rows), of each look the largest defect, or difference, over the discs, and the largest positions and angles.
+    looks : (m,), the steps that are looked at, counted from 1. passed : the number of looks done.
+    doubted : whether the next step is to be compared.
+    limit : the largest relative defect that needs no comparison.
+    short : whether the run may be computed again.
+    places : (m, rows, n), positions after each look of a short run; otherwise (1, rows, n), workspace.
+    defects : (m, 2, rows), for each look the largest defect (or difference) over the discs, and the largest positions and angles.
     """
 
     def __init__(self, steps: int, rows: int, n: int) -> None:
@@ -64,12 +64,12 @@ class Watch:
         self.defects = np.empty((count, 2, rows))
 
     def given(self, first: int) -> Looks:
-        """What compiled steps are told, after `first` of them."""
+        """The arguments about looks for compiled steps, after `first` steps."""
         k = self.passed
         return first, self.looks[k:], self.places[k if self.short else 0 :], self.defects[k:], self.limit
 
     def look(self, step: int, before: Float, after: Float) -> bool:
-        """The plain form of a look: positions before and after a step, the last of `step`; whether it is to be compared."""
+        """The plain form of a look, from positions before and after the step number `step`; returns whether to compare the step."""
         if self.passed == self.looks.size or not 0 <= (ahead := int(self.looks[self.passed]) - step) < FEW:
             return False
         if self.steps < FEW:
@@ -88,7 +88,7 @@ class Watch:
         return False
 
     def compare(self, one: Float, two: Float) -> None:
-        """Take positions (rows, n) by one step and by two halves in place of a look."""
+        """Record a look from positions (rows, n) after one step and after two half steps."""
         self._take(np.abs(one - two).max(axis=1), np.abs(two).max(axis=1), one)
 
     def _take(self, off: Float, size: Float, place: Float) -> None:
@@ -97,12 +97,12 @@ class Watch:
         self.passed, self.doubted = self.passed + 1, False
 
     def put_off(self, step: int) -> None:
-        """Begin a look anew that is interrupted after a step."""
+        """Postpone a look that was interrupted after a step."""
         if self.passed < self.looks.size and self.looks[self.passed] - step < FEW:
             self.looks[self.passed], self.doubted = step + min(FEW, self.steps), False
 
     def estimate(self) -> float:
-        """The estimate from what was seen so far."""
+        """The estimate from the looks done so far."""
         if not self.passed:
             return 0.0
         seen = self.defects[: self.passed]
@@ -113,7 +113,7 @@ class Watch:
     def again(
         self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: Float, h: float, parameters: Parameters
     ) -> float | None:
-        """The error by a run with half the step, at the places kept and at the `last` one; None if that run fails."""
+        """The error against a run with half the step, at the positions kept and at the `last` ones; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
         size = self.defects[: self.passed, 1].max(axis=0)
         steps = [*self.looks.tolist(), self.steps] if self.steps else []
@@ -129,7 +129,7 @@ class Watch:
 def advanced(
     system: RollingDiscs, integrator: FixedStep, memory: Memory, t: float, h: float, steps: int, parameters: Parameters
 ) -> tuple[Memory, Tally]:
-    """What the integrator remembers some steps later, and what they cost."""
+    """The memory of the integrator some steps later, and the tally of these steps."""
     if parameters is not None:
         return integrator.march(parameters, memory, t, h, steps, np.inf)
     work = Work()
@@ -141,7 +141,7 @@ def advanced(
 def converging(
     system: RollingDiscs, integrator: FixedStep, before: Memory, t: float, steps: int, h: float, parameters: Parameters
 ) -> float:
-    """A step with which the first of `steps` steps that does not converge, from a state, would; h/2^HALVINGS if none was found."""
+    """A step with which the first unconverged one of `steps` steps would converge; h/2^HALVINGS if none was found."""
     for _ in range(steps):
         after, tally = advanced(system, integrator, before, t, h, 1, parameters)
         if tally.unconverged:
@@ -155,7 +155,7 @@ def converging(
 
 
 def doubts(stats: Stats) -> list[str]:
-    """Why a run is not to be trusted, in words, from what it tells of itself."""
+    """Reasons not to trust a run, in words, from its stats."""
     found = []
     if stats.get("unconverged") and (stuck := _number(stats["unconverged"])):
         steps = _number(stats.get("steps")) + _number(stats.get("short_steps"))
@@ -168,11 +168,11 @@ def doubts(stats: Stats) -> list[str]:
 
 
 def cure(stats: Stats) -> str:
-    """A step that might do, in words: with it the run's steps converge, and err by AIM if errors go like its square."""
+    """A suggested dt, in words: with it steps converge, and the error is AIM if it goes like the square of dt."""
     shorter: float = stats["dt"] * np.sqrt(min(AIM / (stats.get("step_error") or AIM), 1.0))
     return f"dt = {min(shorter, stats.get('converging_dt', np.inf)):.2g}"
 
 
 def _number(value: object) -> float:
-    """What a run tells of itself, 0 where that is no number: a file may hold anything."""
+    """A value of stats if it is a number, otherwise 0: a file may hold anything."""
     return value if isinstance(value, int | float) else 0

@@ -1,4 +1,4 @@
-"""A step to begin with."""
+"""`suggest_dt`: a time step to begin with."""
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
@@ -9,16 +9,16 @@ from discs.problem import Problem
 
 
 def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float:
-    """A step to begin with: it follows torsion waves if implicit, and is 0.7 of the stability limit if explicit.
+    """A time step to begin with: an implicit method resolves torsion waves, an explicit one is stable.
 
-    No error is promised. Measured with the midpoint method, N = 17 to 257, relative to the largest value of each coordinate: 1e-5
-    to 1e-3 on the paper's twist of half a turn (both laws, own headings A = G = 10) and the breathing ring; of order 1 for two
-    turns at N = 65, where a third of the steps do not converge. For a promised error give `simulate` a tol.
+    The error is not bounded; for a bound give `simulate` a tol. Measured with the midpoint method, N = 17 to 257, relative to the
+    largest value of each coordinate: 1e-5 to 1e-3 on the paper's twist of half a turn (both laws, own headings A = G = 10) and the
+    breathing ring; of order 1 for two turns at N = 65, where a third of the steps do not converge.
 
-    Implicit: half the time a torsion wave takes from disc to disc, at most a hundredth of the duration.
-    SciPy's methods: a tenth of the duration, the longest step they may take.
-    Explicit: the limit is the method's over Omega, Omega^2 the largest eigenvalue of C^T S C at the start; 0.7 leaves room for
-    headings that grow.
+    Implicit methods: half the time in which a torsion wave passes from disc to disc, at most a hundredth of the duration.
+    SciPy's methods: a tenth of the duration, as the longest step.
+    Explicit methods: 0.7 of the stability limit, at most a hundredth of the duration. The limit is `stability_limit`/Omega with
+    Omega^2 the largest eigenvalue of C^T S C at the start; the factor 0.7 allows for slopes |r'| that grow.
     """
     integrator = find(method)
     chain = problem.chain

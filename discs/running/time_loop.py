@@ -1,4 +1,4 @@
-"""Steps without end: what carries a run from frame to frame, plain or compiled, and stops it when it has gone wrong."""
+"""The time loop: advances a run to each output time, plain or compiled, and stops it on failure."""
 
 import sys
 from typing import Any
@@ -14,19 +14,19 @@ from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
 from discs.warn import warn
 
-NOTICE = 2.0  # seconds of compiling after which it is said, if kernels are not read from the cache
+NOTICE = 2.0  # seconds of compiling after which a notice is printed; reading kernels from the cache does not count
 _PREPARED: set[tuple[type, ...]] = set()
-WATCHED = ("looks", "passed", "doubted", "defects", "places")  # of a watch, what a run goes on from
-CHUNK = 4_000_000  # discs times steps of a compiled call, then progress is shown; Ctrl-C is heard in every sweep
+WATCHED = ("looks", "passed", "doubted", "defects", "places")  # attributes of a `Watch` that a restart needs
+CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown between calls, Ctrl-C is polled in every sweep
 
 
 class SimulationError(RuntimeError):
-    """A run that could not go on.
+    """A run that failed.
 
     Attributes
     ----------
-    step, time, disc : where it stopped.
-    slope : |r'| of a disc that lost its heading, at the last step before; NaN for other causes.
+    step, time, disc : where it failed.
+    slope : |r'| of a disc that lost its heading, one step before; NaN for other causes.
     """
 
     def __init__(self, message: str, step: int, time: float, disc: int, slope: float = np.nan) -> None:
@@ -38,35 +38,35 @@ class SimulationError(RuntimeError):
 
 
 def _warn_of_lost_digits(system: RollingDiscs, h: float) -> None:
-    """Warn where solves with I + h^2/4 C^T S C lose the digits that sweeps would win back.
+    """Warn where rounding in solves with I + h^2/4 C^T S C stops the convergence of sweeps.
 
-    A sweep multiplies what is still wrong by the largest entry, h^2 `stiffest`, times the unit of rounding, 1.1e-16: sweeps stop
-    converging when that comes near one.
+    A sweep multiplies the remaining error by the largest entry, h^2 `stiffest`, times the unit of rounding, 1.1e-16. Sweeps do not
+    converge where this factor is near one.
     """
     lost = 1.1e-16 * h * h * system.stiffest
     if lost > 0.1:
         warn(
-            f"{system.n} discs at dt = {h:g}: each sweep of a step keeps {lost:.1g} of what is wrong, by rounding, and the run "
+            f"{system.n} discs at dt = {h:g}: each sweep of a step leaves {lost:.1g} of its error, due to rounding, and the run "
             f"may not be trusted; take dt below {h * np.sqrt(0.1 / lost):.1g}, or fewer discs"
         )
 
 
 class March:
-    """A run on its way.
+    """The state of a run, advanced step by step.
 
     Parameters
     ----------
-    problem, integrator, h : what runs, how, and in which steps.
-    compiled : use the chain's compiled form.
-    quiet : do not say that kernels are being compiled.
-    watch : where the error of the steps is looked at; None nowhere.
+    problem, integrator, h : the problem, the method and its step.
+    compiled : use the compiled form of the chain.
+    quiet : print no notice that kernels are being compiled.
+    watch : the estimate of the error of the steps; None for none.
 
     Attributes
     ----------
-    step : steps taken.
-    stuck : some states from which steps did not converge, their times, and how many steps were taken from each.
-    work : what they cost.
-    memory : what the integrator remembers.
+    step : number of steps taken.
+    stuck : some states before steps that did not converge, with their times and the number of steps taken from each.
+    work : the cost of the steps.
+    memory : the memory of the integrator.
     """
 
     def __init__(
@@ -90,8 +90,8 @@ class March:
             self._prepare(quiet)
 
     def _prepare(self, quiet: bool) -> None:
-        """Have the kernels compiled: once for all runs on a machine, read from disc once in a process."""
-        key = (type(self.integrator), *map(type, self.parameters or ()))  # of the chain's laws and load too
+        """Compile the kernels (once per machine) or read them from disc (once per process)."""
+        key = (type(self.integrator), *map(type, self.parameters or ()))  # the types of the chain's laws and load too
         if key in _PREPARED:
             return
         from discs.kernels.compiled import compiling, uncached
@@ -108,13 +108,13 @@ class March:
         _PREPARED.add(key)
 
     def keep(self) -> dict[str, Any]:
-        """All that the run goes on from, as arrays and numbers by name."""
+        """All that a restart needs, as arrays and numbers by name."""
         work = {f"work.{name}": value for name, value in vars(self.work).items()}
         seen = {f"watch.{name}": getattr(self.watch, name) for name in WATCHED} if self.watch else {}
         return {"step": self.step} | work | seen | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
 
     def recall(self, kept: dict[str, Any]) -> None:
-        """Go on from what was kept of the same run."""
+        """Restore what `keep` returned for the same run."""
         self.step = int(kept["step"])
         for name in vars(self.work):
             setattr(self.work, name, int(kept[f"work.{name}"]))
@@ -126,7 +126,7 @@ class March:
         self.memory = self.integrator.recall(self.memory, of_memory)
 
     def on(self, step: int) -> None:
-        """Go on towards a step, not beyond it; no way at all where Ctrl-C was heard and did not raise."""
+        """Advance towards a step, not beyond it; not at all if Ctrl-C was pressed and its handler did not raise."""
         before, cost, watch, looks = self.memory, vars(self.work).copy(), self.watch, NO_LOOKS
         try:
             if self.twin is None:
@@ -137,7 +137,7 @@ class March:
                     steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
                 self.memory, tally = self.twin.march(self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks)
                 taken = self._accept(self.twin, before, tally)
-        except Cut:  # all of this turn is dropped
+        except Cut:  # drop this call
             self.memory = before
             vars(self.work).update(cost)
             if watch is not None:
@@ -148,12 +148,12 @@ class March:
         self.step += taken
 
     def _compare(self, watch: Watch, before: Memory) -> None:
-        """Compare the step just taken with one of less error."""
+        """Compare the last step with a more accurate one."""
         finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.parameters)
         watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
 
     def step_error(self, rest: float) -> float:
-        """The estimate of the watch, at the end of a run that ends a time `rest` after its last step."""
+        """The estimated error of a run that ends a time `rest` after its last step."""
         watch, integrator = self.watch, self.integrator
         if watch is None:
             return 0.0
@@ -169,19 +169,19 @@ class March:
         return found
 
     def _remember(self, before: Memory, steps: int, stuck: int) -> None:
-        """Keep a state from which steps did not converge, whenever their number has doubled: the first and the last three."""
+        """Keep the state before unconverged steps whenever their number has doubled: the first one and the last three."""
         if not stuck or stuck.bit_length() < self.work.unconverged.bit_length():
             self.stuck = [*self.stuck[:1], *self.stuck[1:][-2:], (before, self.step * self.h, steps)]
 
     def remedy(self) -> Stats:
-        """A step that converges where the run's did not, by the name that `stats` has for it; empty if it is not known."""
+        """The entry `converging_dt` of stats, a time step with which the run's steps converge; empty if there is none to find."""
         if not self.stuck or not isinstance(self.integrator, FixedStep):
             return {}
         tried = (converging(self.system, self.integrator, *place, self.h, self.parameters) for place in self.stuck)
         return {"converging_dt": min(tried)}
 
     def frame(self, tau: float) -> Frame:
-        """The discs a time 0 <= tau < h after the last step; `Cut` where Ctrl-C was heard and did not raise."""
+        """The discs a time 0 <= tau < h after the last step; raises `Cut` if Ctrl-C was pressed and its handler did not raise."""
         stuck = self.work.unconverged
         try:
             frame = self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, self.work, self.parameters)
@@ -198,7 +198,7 @@ class March:
         return frame
 
     def observe(self, frame: Frame) -> dict[str, Any]:
-        """What every frame records, by the names that `Solution` has for it."""
+        """The quantities that every frame records, by their names in `Solution`."""
         system = self.system
         if frame.seen is not None:
             q, energy, slip = frame.seen
@@ -220,7 +220,7 @@ class March:
             self.memory = self.integrator.advance(self.system, previous, self.step * self.h, self.h, self.work)
         except ArithmeticError as error:
             raise self._gave_up(error) from None
-        # leapfrog remembers more than a state; its moves are its velocity
+        # not leapfrog, whose memory is no `Phase`: its moves are its velocities
         by_velocity = self.work.unconverged > stuck or (self.explicit and isinstance(previous, Phase))
         self._check(self._lost(previous, self.memory, self.h, by_velocity), self.step + 1, previous)
         if self.watch is not None and self.watch.look(self.step + 1, previous.hi, self.memory.hi):
@@ -228,10 +228,10 @@ class March:
         return 1
 
     def _lost(self, before: Memory, after: Placed, h: float, by_velocity: bool) -> int | None:
-        """A disc that lost its heading on the straight way from memory `before` to `after`, or that its velocity pointed.
+        """A disc whose heading vanishes on the straight line from `before` to `after`, or along its initial velocity; None if none.
 
-        The velocity tells where a step did not converge, as its end is then undefined, and in explicit steps, whose stages
-        jump to and fro across r' = 0. (Converged steps may be long beside the time of a wave: there it would tell wrong.)
+        The velocity is used after a step that did not converge, whose end is undefined, and after an explicit step, whose stages
+        may jump across r' = 0. (It is no guide for converged steps, which may be longer than the period of a wave.)
         """
         lost = self.system.lost_heading(before, after)
         if lost is None and by_velocity and self.system.vanishing:

@@ -47,7 +47,7 @@ def test_the_line_is_the_users(door, words):
 
 
 def test_lost_digits_and_a_checkpoint(tmp_path):
-    with pytest.warns(UserWarning, match="keeps .* of what is wrong, by rounding") as told:
+    with pytest.warns(UserWarning, match="leaves .* of its error, due to rounding") as told:
         simulate(FINE, dt=0.05, frames=1, progress=False, checkpoint=tmp_path / "run.nc")
     assert {warning.filename for warning in told} == {__file__}
 
