@@ -33,7 +33,6 @@ from discs.skew import Phase
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
 NODES = 1025  # of a solution, so many that splines through them do for derivatives too; more where initial fields are narrow
 MOST_NODES = 8192
-FIRST_FACTOR = 2.0
 LOOSEST = 2e-4  # tolerance of a step
 FAR = 100.0  # times the tolerance: errors above that are not yet for shorter steps to mend
 LEAST, MOST = 1 / 3, 0.8  # what a finer motion errs by, over the error of the coarser one

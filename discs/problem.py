@@ -53,8 +53,8 @@ class Problem:
     chain : the discs and their springs.
     initial : state at t = 0.
     duration : time to simulate, > 0.
-    loads : forces besides those of springs and ground, see `discs.loads`; they are added. Energy is then not conserved, and no
-        warning compares it.
+    loads : forces besides those of springs and ground, see `discs.loads`; they are added. Their potentials are part of the energy.
+        If a load has none, as a damper, energy is not conserved, and no warning compares it.
 
     Raises
     ------
@@ -137,15 +137,21 @@ class Problem:
 
     @cached_property
     def blown_up(self) -> float:
-        """Blow-up threshold of the kinetic energy: ten times the conserved energy; infinite with loads.
+        """Blow-up threshold of the kinetic energy: ten times the most that conservation of energy allows; infinite without a bound.
 
-        V >= 0, so kinetic energy cannot exceed the conserved energy. The small constant keeps rounding at rest below it.
+        V >= 0, so that is the energy, less the least potential of loads. The small constant keeps rounding at rest below it.
         """
-        if self.loads:
+        load, chain = self.system.load, self.chain
+        if not self.conserves:
             return np.inf
-        chain = self.chain
+        most = self.energy() if load is None else self.energy() - load.least
         stiffest = np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)
-        return float(10 * self.energy() + 1e-16 * stiffest / chain.length)
+        return float(10 * most + 1e-16 * stiffest / chain.length)
+
+    @property
+    def conserves(self) -> bool:
+        """Whether energy is conserved: by springs and ground always, by loads where all are conservative."""
+        return self.system.load is None or self.system.load.conservative
 
     @cached_property
     def ill_posed(self) -> str:
@@ -159,7 +165,7 @@ class Problem:
         chain = self.chain
         if not isinstance(chain, Chain) or np.any(chain.bending_stiffness) or not stretching(chain.rolling_law):
             return ""
-        if not np.any(chain.radius) or self.energy() <= 0:  # without energy nothing moves
+        if not np.any(chain.radius) or (self.energy() <= 0 and not self.loads):  # without energy nothing moves
             return ""
         rate = np.max(np.asarray(chain.radius) * np.abs(self.initial.omega)) / chain.k
         now = f", at the start up to {rate:.3g} per unit of time" if rate > 0 else ""
@@ -170,10 +176,11 @@ class Problem:
         )
 
     def energy(self, state: State | None = None) -> float:
-        """Kinetic and potential energy of a state, the initial one by default."""
+        """Kinetic and potential energy of a state, the initial one by default; potentials of loads are part of it."""
         return self._energy if state is None else Problem(self.chain, state, self.duration, self.loads)._energy
 
     @cached_property
     def _energy(self) -> float:
-        z = self.start()
-        return 0.5 * float(np.vdot(z.pi, z.pi)) + self.system.potential(self.system.shape(z.hi, z.lo))
+        z, system = self.start(), self.system
+        energy = 0.5 * float(np.vdot(z.pi, z.pi)) + system.potential(system.shape(z.hi, z.lo))
+        return energy if system.load is None else energy + system.load.potential(z.hi + z.lo)

@@ -94,7 +94,7 @@ def simulate(
 def doubted(problem: Problem, run: Solution) -> str:
     """The warning for a run that may not be trusted; empty if there is none."""
     method = run.stats["method"]
-    said = lost_energy(problem, method, run.t, run.energy)
+    said = lost_energy(problem, method, run.t, run.energy, run)
     stats = run.stats
     doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # first, as it is cheap and most runs pass
     if doubtful and (reasons := doubts(stats)):
@@ -139,11 +139,18 @@ def _search(
     return found, doubt
 
 
-def lost_energy(problem: Problem, method: str, t: Float, energy: Float) -> str:
-    """The warning if energies (F,) at times (F,) drift from the initial one by more than ENERGY_DRIFT_WARNING; else empty."""
+def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Solution | None = None) -> str:
+    """The warning if energies (F,) at times (F,) drift from the initial one by more than ENERGY_DRIFT_WARNING; else empty.
+
+    The drift is relative to the largest kinetic energy that is possible or, if loads set no bound, to the largest energy of `run`
+    without that of loads.
+    """
     off = np.abs(energy - problem.energy())
-    worst = int(off.argmax())
-    if off[worst] <= ENERGY_DRIFT_WARNING * problem.blown_up / 10:
+    worst, most, load = int(off.argmax()), problem.blown_up / 10, problem.system.load
+    if load is not None and load.conservative and most == np.inf and run is not None:
+        paths = np.stack([getattr(run, row) for row in problem.system.rows], axis=1)
+        most = max(float(e) - load.potential(q) for e, q in zip(energy, paths, strict=True))
+    if off[worst] <= ENERGY_DRIFT_WARNING * most:
         return ""
     return (
         f"{method}: energy is conserved, but at t = {t[worst]:g} it is {energy[worst]:.3g} and not {problem.energy():.3g}: the run "

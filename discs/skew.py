@@ -65,11 +65,19 @@ class Load(ABC):
     ----------
     damping, stiffness : (rows, n), minus the derivatives of f by v and by q, of its linear part that acts disc by disc. Implicit
         steps add them to their matrix. `force` is the whole of f, these parts included.
+    conservative : whether f = -grad U with U = `potential`; then the energy, U included, is conserved.
+    least : a lower bound of U, used to detect blow-up; -inf if none is known.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
     """
 
     damping: Float
     stiffness: Float
+    conservative: bool = False
+    least: float = -np.inf
+
+    def potential(self, q: Float) -> float:
+        """U, the load's part of the energy, at positions (rows, n); 0 where it has none."""
+        return 0.0
 
     @abstractmethod
     def force(self, t: float, q: Float, v: Float) -> Float:

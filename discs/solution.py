@@ -37,7 +37,7 @@ class Solution:
     x, y : (F, N), contact points, length.
     theta : (F, N), roll angles, rad.
     omega : (F, N), rates of roll, rad per time.
-    energy : (F,), kinetic and potential energy.
+    energy : (F,), kinetic and potential energy; potentials of loads are part of it.
     rolling_residual : (F,), largest |r. - e omega| over the discs, length per time, of the method's own velocities: zero up to
         rounding. (Methods in (q, pi) compute r. as e omega. Their steps roll if |r_{n+1} - r_n - e (theta_{n+1} - theta_n)| = 0
         with e at the midpoint.) None for an extrapolated field.

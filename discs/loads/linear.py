@@ -14,6 +14,8 @@ from discs.skew import Load
 class Linear(Load):
     """f = constant - damping v - stiffness q, with rows x, y, theta (and phi) and a column for each disc.
 
+    Its potential is the sum of stiffness q^2/2 - constant q, the least where stiffness q = constant.
+
     Attributes
     ----------
     constant : (rows, n), force in rows x and y, torque in the others; any shape that broadcasts with the other two.
@@ -40,6 +42,13 @@ class Linear(Load):
             if not np.isfinite(value).all() or (name != "constant" and (value < 0).any()):
                 raise ValueError(f"{name} must be finite{'' if name == 'constant' else ' and at least 0'}; got {value}")
             object.__setattr__(self, name, np.array(value))
+        object.__setattr__(self, "conservative", not self.damping.any())
+        pushed = self.constant != 0
+        push, spring = self.constant[pushed], self.stiffness[pushed]
+        object.__setattr__(self, "least", -0.5 * float((push**2 / spring).sum()) if spring.all() else -np.inf)
+
+    def potential(self, q: Float) -> float:
+        return float(np.vdot(0.5 * self.stiffness * q - self.constant, q))
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = self.constant - self.damping * v - self.stiffness * q

@@ -63,7 +63,8 @@ def orders(earlier: Solution, run: Solution, finer: Solution, most: int) -> dict
 def errors(run: Solution, finer: Solution, order: Mapping[str, float]) -> dict[str, float]:
     """Estimated errors of a run, largest over discs and frames, from one with shorter steps; see `discs.running.tolerance`.
 
-    order : observed orders, 1 where one is missing. The errors left by sweeps are added. The error of the energy is its drift.
+    order : observed orders, 1 where one is missing. The errors left by sweeps are added. The error of a conserved energy is its
+        drift.
     """
     assert run.problem is not None
     ratio, more = run.stats["dt"] / finer.stats["dt"], unswept(run)
@@ -71,7 +72,9 @@ def errors(run: Solution, finer: Solution, order: Mapping[str, float]) -> dict[s
     for name, off in differences(run, finer).items():
         part = 1 - ratio ** -min(order.get(name, 1.0), MOST_ORDER)
         found[name] = SAFETY * off / part + more.get(name, 0.0)
-    return found | {"energy": float(np.abs(run.energy - run.problem.energy()).max())}
+    if run.problem.conserves:
+        found["energy"] = float(np.abs(run.energy - run.problem.energy()).max())
+    return found
 
 
 def unswept(run: Solution) -> dict[str, float]:

@@ -211,6 +211,8 @@ class March:
             shape = system.shape(frame.hi, frame.lo)
             q, energy = frame.hi + frame.lo, system.kinetic(frame.rate) + system.potential(shape)
             slip = np.hypot(*(frame.rate[:2] - system.contact(shape) * frame.rate[2])).max()
+        if system.load is not None:
+            energy += system.load.potential(q)
         found = dict(zip(system.rows, q, strict=True)) | dict(zip(system.rates[2:], frame.rate[2:], strict=True))
         return found | {"energy": energy, "rolling_residual": slip}
 

@@ -7,7 +7,7 @@ import pytest
 
 from discs import Chain, Midpoint, Problem, State, simulate
 from discs.integrators import METHODS, Work
-from discs.loads import Linear, Load
+from discs.loads import Linear, Load, total
 from discs.mechanics.lagrange import frames as coordinates
 from discs.mechanics.lagrange import lagrange_dalembert
 from tests.conftest import Model, models, uneven
@@ -35,7 +35,7 @@ def loaded(model: Model, n: int = 7) -> Problem:
 
 def by_multipliers(problem: Problem):
     """The end by Lagrange-d'Alembert with multipliers and the same forces, by DOP853: another formulation, another method."""
-    n, free = problem.chain.n, lagrange_dalembert(problem, dense=True)
+    n, free = problem.chain.n, lagrange_dalembert(replace(problem, loads=()), dense=True)
 
     def force(q, v):
         push = sum(load.force(0.0, q.reshape(-1, n), v.reshape(-1, n)) for load in problem.loads)
@@ -112,6 +112,84 @@ def test_a_midpoint_step_balances_energy_and_work_to_rounding(model):
     assert abs(work) > 1e-3 * before
 
 
+def held(push: float, spring: float, model: Model = KINDS[0], n: int = 7) -> Problem:
+    """An uneven chain, pushed along y and held by springs to a place."""
+    problem = uneven(n, model)
+    shape = len(problem.system.rows), n
+    constant = np.zeros(shape)
+    constant[1] = push
+    return replace(problem, loads=(Linear(constant), Linear(stiffness=np.full(shape, spring))))
+
+
+@models([KINDS[0], KINDS[4]])
+def test_potentials_of_loads_are_part_of_the_energy(model, kernels_as_python):
+    """Midpoint steps keep a quadratic energy to rounding, and it is not that of the springs alone."""
+    problem = held(0.3, 0.2, model)
+    for engine in ("compiled", "plain"):
+        run = simulate(problem, Midpoint(tolerance=1e-14), 0.02, 3, progress=False, engine=engine)
+        alone = [e - problem.system.load.potential(q) for e, q in zip(run.energy, positions(run), strict=True)]
+        assert abs(run.energy - problem.energy()).max() < (1e-12 if problem.system.quadratic else 1e-11)
+        assert abs(alone[-1] - alone[0]) > 1e-3
+
+
+def positions(run):
+    return np.stack([getattr(run, row) for row in run.problem.system.rows], axis=1)
+
+
+class Well(Load):
+    """A user's conservative load: U = -cos(4 y)/4, whose bound the run is not told."""
+
+    conservative = True
+
+    def __init__(self, shape):
+        self.damping = self.stiffness = np.zeros(shape)
+
+    def potential(self, q):
+        return -0.25 * np.cos(4 * q[1]).sum()
+
+    def force(self, t, q, v):
+        f = np.zeros_like(q)
+        f[1] = -np.sin(4 * q[1])
+        return f
+
+
+def test_the_energy_of_a_load_of_ones_own_is_watched():
+    problem = replace(uneven(5, KINDS[0]), loads=(Well((3, 5)),))
+    run = simulate(problem, "rk4", 0.002, 11, progress=False)
+    assert abs(run.energy - problem.energy()).max() < 1e-9
+    assert problem.conserves
+    assert problem.blown_up == np.inf
+    false = Well((3, 5))
+    false.potential = lambda q: 0.0
+    with pytest.warns(UserWarning, match="rk4: energy is conserved, but at t = .* it is"):
+        simulate(replace(problem, loads=(false,)), "rk4", 0.002, 11, progress=False)
+
+
+def test_the_bound_of_kinetic_energy_knows_the_loads():
+    problem = uneven(7, KINDS[0])
+    free, pushed, braked = held(0.3, 0.2), held(0.3, 0.0), loaded(KINDS[0])
+    least = -0.5 * 7 * 0.3**2 / 0.2  # at y = 0.3/0.2
+    assert free.system.load.least == pytest.approx(least)
+    assert free.blown_up == pytest.approx(10 * (free.energy() - least), rel=1e-12)
+    assert held(0.0, 0.2).blown_up == pytest.approx(10 * held(0.0, 0.2).energy(), rel=1e-12)
+    assert pushed.blown_up == braked.blown_up == np.inf
+    assert [p.conserves for p in (problem, free, pushed, braked)] == [True, True, True, False]
+    both = total((Well((3, 7)), *held(0.3, 0.2).loads))
+    q = problem.start().hi
+    assert both.potential(q) == pytest.approx(sum(load.potential(q) for load in both.loads))
+    assert (both.conservative, both.least) == (True, -np.inf)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.4])
+def test_the_error_of_the_energy_is_what_it_changed_by_only_where_it_is_conserved(damping):
+    problem = uneven(5, KINDS[0])
+    problem = replace(problem, loads=(Linear(damping=np.full((3, 5), damping), stiffness=np.full((3, 5), 0.1)),))
+    run = simulate(problem, "rk4", tol=1e-4, frames=3, engine="plain", progress=False)
+    changed = abs(run.energy - problem.energy()).max()
+    assert (run.error_estimate["energy"] == pytest.approx(changed)) == (damping == 0)
+    assert run.error_estimate["energy"] < 1e-3 < (changed if damping else 1)
+
+
 class Wind(Load):
     """A user's load, in NumPy: quadratic drag and a push that starts at t = 0.3."""
 
@@ -141,6 +219,7 @@ def test_a_load_without_a_compiled_form_runs_on_the_plain_engine():
         (lambda: replace(uneven(7, KINDS[0]), loads=(Linear(np.ones((4, 7))),)), r"Linear: .* must have shape \(3, 7\)"),
         (lambda: replace(uneven(7, KINDS[0]), loads=Linear(np.ones((3, 7)))), "loads must be a tuple of loads"),
         (lambda: simulate(loaded(KINDS[0]), "leapfrog", 0.001), "'leapfrog' does not take loads; take a method that does"),
+        (lambda: lagrange_dalembert(loaded(KINDS[0])), "takes a problem without loads; got some: take replace"),
         (
             lambda: simulate(loaded(KINDS[0]), dt=0.1, frames=1, engine="plain").save("never.nc"),
             "a run with loads cannot be written to a file",

@@ -18,6 +18,11 @@ class Total(Load):
     def __post_init__(self) -> None:
         for name in ("damping", "stiffness"):
             object.__setattr__(self, name, np.sum([getattr(load, name) for load in self.loads], axis=0))
+        object.__setattr__(self, "conservative", all(load.conservative for load in self.loads))
+        object.__setattr__(self, "least", sum(load.least for load in self.loads))
+
+    def potential(self, q: Float) -> float:
+        return sum(load.potential(q) for load in self.loads)
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = np.sum([load.force(t, q, v) for load in self.loads], axis=0)
