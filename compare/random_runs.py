@@ -104,7 +104,7 @@ def _judged(problem: Problem, found: Solution, row: Row, seconds: float) -> Row:
 
 def _shown(problem: Problem, error: Exception, seconds: float) -> str:
     """Whether a refusal is true, in words."""
-    if "rounding is what is left" in str(error):
+    if "rounding is the limit" in str(error):
         return "rounding"
     if not isinstance(error, SimulationError) or not error.step:
         return ""

@@ -191,7 +191,7 @@ def _run(
         raise ValueError(f"{integrator.name!r} does not take loads; take a method that does, as 'midpoint'")
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
-        raise ValueError(f"{integrator.offers[0]} needs a quadratic potential, which this chain has not")
+        raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
     about: Stats = {
         "method": integrator.name,
         "order": integrator.order,

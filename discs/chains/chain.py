@@ -196,7 +196,7 @@ def _settle(chain: "Chain | SteeredChain", **ranges: tuple[int, bool]) -> None:
     object.__setattr__(chain, "length", checks.number("length", chain.length, positive=True))
     if not SHORTEST < chain.k < 1 / SHORTEST:
         raise ValueError(
-            f"length makes the discs' spacing {chain.k:g}; it must be between {SHORTEST:g} and {1 / SHORTEST:g}: take other units"
+            f"length gives the discs a spacing of {chain.k:g}; it must be between {SHORTEST:g} and {1 / SHORTEST:g}: change units"
         )
     shift = checks.field("shift", chain.shift, 2)
     if chain.ends != "ring" and shift.any():

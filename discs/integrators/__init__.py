@@ -54,7 +54,7 @@ def from_settings(text: str) -> Integrator:
     except (SyntaxError, TypeError, ValueError, RecursionError, MemoryError):
         found = None
     if not isinstance(found, Integrator):
-        raise ValueError(f"these are no settings of an integrator: {text[:80]!r}")
+        raise ValueError(f"not the settings of an integrator: {text[:80]!r}")
     return found
 
 

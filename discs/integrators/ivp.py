@@ -144,7 +144,7 @@ class Course:
         while self.solver.t < time:
             message = self.solver.step()
             if self.solver.status == "failed":
-                raise ArithmeticError(f"{type(self.solver).__name__} gave up at t = {self.solver.t:g}: {message}")
+                raise ArithmeticError(f"{type(self.solver).__name__} failed at t = {self.solver.t:g}: {message}")
         work.gradients, work.solves = self.solver.nfev, self.solver.nlu
         return Course(self.f, self.solver, time, self.f.split(self.solver.dense_output()(time)))
 

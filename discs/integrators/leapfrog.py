@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import FixedStep, Frame, Work
 from discs.integrators.rk4 import RK4
@@ -13,16 +13,16 @@ from discs.kernels import protocol as do
 from discs.kernels.compiled import Cost, fill
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import back, columns, copy, forward, square
-from discs.skew import Phase, add
+from discs.skew import Parameters, Phase, add
 
 
 class TwoStep(NamedTuple):
-    """What the scheme remembers: q_n = hi + lo, and the moves q_n - q_{n-1} and q_{n+1} - q_n, all (3, n)."""
+    """The memory of the scheme: q_n = hi + lo, and the moves q_n - q_{n-1} and q_{n+1} - q_n, all (rows, n)."""
 
-    hi: NDArray
-    lo: NDArray
-    last: NDArray
-    next: NDArray
+    hi: Float
+    lo: Float
+    last: Float
+    next: Float
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Leapfrog(FixedStep):
     q_{n+1} - q_{n-1} = C C^T M (q* - q_{n-1}). For a disc, (alpha + rho |e|^2) u = rho e.(r* - r_{n-1}) + alpha (theta* -
     theta_{n-1}) and a move (e, 1) u.
 
-    It conserves |v|^2/2 + V(q_n, q_{n+1}) exactly, v = (q_{n+1} - q_n)/h weighed with the masses and V the bilinear form
-    ("modified_energy"): multiply by q_{n+1} - q_{n-1}, which A annihilates. It needs h <= k^2/2 sqrt(rho/K), and carries
-    a parasitic mode: the part of v off the constraint can flip its sign every step, and grow.
+    It conserves the "modified_energy" |v|^2/2 + V(q_n, q_{n+1}) exactly, with v = (q_{n+1} - q_n)/h in the norm of the masses and V
+    the bilinear form. (Multiply by q_{n+1} - q_{n-1}, which A annihilates.) It needs h <= k^2/2 sqrt(rho/K). It has a parasitic
+    mode: the part of v that violates the constraint can change its sign every step, and grow.
 
-    The move before the first one and frames between steps come from a Runge-Kutta step; velocities at frames are the
-    central differences (q_{n+1} - q_{n-1})/2h.
+    The first move and frames between steps are computed by a Runge-Kutta step. Velocities at frames are the central
+    differences (q_{n+1} - q_{n-1})/2h.
     """
 
     name: ClassVar[str] = "leapfrog"
@@ -51,7 +51,7 @@ class Leapfrog(FixedStep):
     takes_loads: ClassVar[bool] = False
     offers: ClassVar[tuple[str, ...]] = ("modified_energy",)
 
-    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Any = None) -> TwoStep:
+    def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> TwoStep:
         first = RK4().step(system, z, 0.0, h, work)
         move = (first.hi - z.hi) + (first.lo - z.lo)
         central = 2 * h * system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi)
@@ -69,16 +69,18 @@ class Leapfrog(FixedStep):
     def parameters(self) -> "Central":
         return CENTRAL
 
-    def at(self, system: RollingDiscs, memory: TwoStep, t: float, tau: float, h: float, work: Work, chain: Any = None) -> Frame:
+    def at(
+        self, system: RollingDiscs, memory: TwoStep, t: float, tau: float, h: float, work: Work, chain: Parameters = None
+    ) -> Frame:
         rate = (memory.last + memory.next) / (2 * h)
         if not tau:
             return Frame(memory.hi, memory.lo, rate)
         return RK4().at(system, self._phase(system, memory, rate), t, tau, h, work, chain)
 
-    def finer(self, system: RollingDiscs, memory: TwoStep, t: float, h: float, chain: Any = None) -> NDArray:
+    def finer(self, system: RollingDiscs, memory: TwoStep, t: float, h: float, chain: Parameters = None) -> Float:
         return RK4().finer(system, self._phase(system, memory, (memory.last + memory.next) / (2 * h)), t, h, chain)
 
-    def _phase(self, system: RollingDiscs, memory: TwoStep, rate: NDArray) -> Phase:
+    def _phase(self, system: RollingDiscs, memory: TwoStep, rate: Float) -> Phase:
         pi = system.back(system.basis(system.shape(memory.hi, memory.lo)), system.weights * rate)
         return Phase(memory.hi, memory.lo, pi)
 
@@ -98,31 +100,31 @@ class Leapfrog(FixedStep):
 
 
 class Central(NamedTuple):
-    """The compiled form needs no numbers but a kind of its own."""
+    """Parameters of the compiled form. weight : of `next` in M (q* - q_{n-1})."""
 
     weight: float
 
 
-CENTRAL = Central(2.0)  # of the move before, in M (q* - q_{n-1})
+CENTRAL = Central(2.0)
 
 
 class Room(NamedTuple):
-    """c, still (zero), g like positions; p like momenta."""
+    """Workspace: c, still (zero), g like positions; p like momenta."""
 
-    c: NDArray
-    still: NDArray
-    g: NDArray
-    p: NDArray
+    c: Float
+    still: Float
+    g: Float
+    p: Float
 
 
 @fill(do.room, Central, _nrt=True)
-def _room(method: Central, chain: Any, state: TwoStep) -> Room:
+def _room(method: Central, chain: Parameters, state: TwoStep) -> Room:
     q = state.hi
     return Room(np.empty_like(q), np.zeros_like(q), np.empty_like(q), np.empty((columns(q.shape[0]), q.shape[1])))
 
 
 @fill(do.step, Central, forceinline=True)
-def _step(method: Central, chain: Any, work: Any, room: Room, before: TwoStep, after: TwoStep, t: float, h: float) -> Cost:
+def _step(method: Central, chain: Parameters, work: Any, room: Room, before: TwoStep, after: TwoStep, t: float, h: float) -> Cost:
     c, still, g, p = room
     advance(before, before.next, 1.0, after)
     do.settle(chain, work, after.hi, after.lo)
@@ -161,7 +163,7 @@ def _take(state: TwoStep, to: TwoStep) -> None:
 
 
 @fill(do.kinetic, TwoStep)
-def _kinetic(state: TwoStep, chain: Any, h: float) -> float:
+def _kinetic(state: TwoStep, chain: Parameters, h: float) -> float:
     total = 0.0
     for row in range(state.next.shape[0]):
         total += square(chain.weights[row], state.next[row])
@@ -169,12 +171,12 @@ def _kinetic(state: TwoStep, chain: Any, h: float) -> float:
 
 
 @fill(do.rate, TwoStep)
-def _rate(state: TwoStep, chain: Any, work: Any, c: NDArray, tau: float, move: NDArray) -> None:
+def _rate(state: TwoStep, chain: Parameters, work: Any, c: Float, tau: float, move: Float) -> None:
     copy(state.next, move)
 
 
 @fill(do.kick, TwoStep)
 def _kick(
-    before: TwoStep, after: TwoStep, chain: Any, work: Any, t: float, h: float, c: NDArray, g: NDArray, defect: NDArray
+    before: TwoStep, after: TwoStep, chain: Parameters, work: Any, t: float, h: float, c: Float, g: Float, defect: Float
 ) -> None:
-    defect[:] = np.inf  # so short a run is always compared
+    defect[:] = np.inf  # a run of so few steps is always compared

@@ -1,13 +1,13 @@
-"""Implicit midpoint in (q, pi), solved by sweeps with frozen geometry."""
+"""The implicit midpoint rule in (q, pi), solved by sweeps with frozen geometry."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.integrators.base import OneStep, Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted
@@ -15,7 +15,7 @@ from discs.kernels.shared import add as advance
 from discs.kernels.shared import copy, renew
 from discs.skew import Phase, SkewGradient, add
 
-WHOLE = np.ones(1)  # the fractions of a step that a composition of this one alone takes
+WHOLE = np.ones(1)  # the fractions of h of a single midpoint step
 
 
 @dataclass(frozen=True)
@@ -29,24 +29,23 @@ class Midpoint(OneStep):
 
         (I + h^2/4 C^T S C) p = pi_n - h/2 C^T S q_n.
 
-    A sweep solves it and takes C again at the midpoint it gives. The energy is exact after any number of sweeps, since
-    H is quadratic and the same C stands in both equations; the step is the midpoint rule, and reversible, when the
-    sweeps have converged.
+    A sweep solves it and evaluates C again at the new midpoint. The energy is exact after any number of sweeps, since H is
+    quadratic and both equations have the same C. The step is the midpoint rule, and reversible, once the sweeps have converged.
 
-    Where V is not quadratic the step's secant takes the place of S, and the energy is exact when the sweeps have converged, not
-    before. Then the matrix only guides the way there: that of the first sweep serves all of a step's sweeps. (Measured on rods
-    with own headings, slack and stiff, h = k ... 16k: no sweep more than with a new matrix for each, and the factors saved are
-    nearly half of a sweep.)
+    If V is not quadratic, the secant of the step replaces S, and the energy is exact only once the sweeps have converged. The
+    matrix then affects only their convergence, and the one of the first sweep is used for all sweeps of a step. (Measured on rods
+    with own headings, slack and stiff, h = k ... 16k: as many sweeps as with a new matrix for each; factoring is nearly half of the
+    cost of a sweep.)
 
-    The matrix has entries up to h^2 K/(M k^4) and costs a solve as many digits. So a sweep solves for the change of p,
-    with the right side pi_n - p - h/2 C^T grad V(q_n + h/2 C p) formed from the links: the digits lost are those of a
-    small change, and the energy keeps 13 to 15 digits where solving for p itself kept 8 to 10.
+    The matrix has entries up to h^2 K/(M k^4), and a solve loses as many digits. So a sweep solves for the change of p, with the
+    right side pi_n - p - h/2 C^T grad V(q_n + h/2 C p) computed from links. Only digits of a small change are lost: the energy
+    keeps 13 to 15 digits, instead of 8 to 10 if p itself is the unknown.
 
     Parameters
     ----------
-    sweeps : the most sweeps in one step.
-    tolerance : a step is converged when a sweep changes no move of the step by more than this part of the chain's length,
-        or of a radian; 0 makes every step take all `sweeps`.
+    sweeps : largest number of sweeps in a step.
+    tolerance : a step has converged if a sweep changes its moves by no more than this, relative to the length of the chain or in
+        rad; with 0 every step takes all `sweeps`.
     """
 
     sweeps: int = 50
@@ -95,20 +94,20 @@ class Midpoint(OneStep):
 
 
 class Composed(NamedTuple):
-    """Midpoint steps of fractions (stages,) of h, for the compiled form."""
+    """Parameters of the compiled form: midpoint steps of fractions (stages,) of h, and the limits of sweeps."""
 
-    fractions: NDArray
+    fractions: Float
     sweeps: int
     tolerance: float
 
 
 class Room(NamedTuple):
-    """p like momenta, move and still (zero) like positions, change (n,)."""
+    """Workspace: p like momenta; move, still (zero) like positions; change (n,)."""
 
-    p: NDArray
-    move: NDArray
-    still: NDArray
-    change: NDArray
+    p: Float
+    move: Float
+    still: Float
+    change: Float
 
 
 @fill(do.room, Composed, _nrt=True)

@@ -5,9 +5,9 @@ from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import OneStep, Work
 from discs.kernels import protocol as do
@@ -19,7 +19,7 @@ from discs.skew import Phase, add
 
 @dataclass(frozen=True)
 class McLachlanPerlmutter(OneStep):
-    r"""Half a drift, a kick with the ground force taken in the middle, half a drift:
+    r"""A half drift, a kick with the ground force of the middle, a half drift:
 
     q_h = q_0 + h/2 v_0,   M (v_1 - v_0) = -h grad V(q_h) + h A(q_h)^T lambda,   q_1 = q_h + h/2 v_1,   A(q_1) v_1 = 0.
 
@@ -27,13 +27,13 @@ class McLachlanPerlmutter(OneStep):
 
         C(q_h)^T M C(q_1) pi_1 = C(q_h)^T (M v_0 - h grad V(q_h)),
 
-    one equation for each disc (and one for its heading). q_1 stands on both sides: it is iterated, from the explicit q_0 + h v_0.
-    Swapping the ends of a step and the signs of the velocities gives the same equations, so the scheme is reversible. Forces are
-    explicit: h is limited as for "leapfrog".
+    one equation for each disc (and one for its heading). q_1 is on both sides and is found by iteration from q_0 + h v_0.
+    The equations do not change if the ends of a step are exchanged and velocities change sign: the scheme is reversible. Forces are
+    explicit, so h is limited as for "leapfrog".
 
     Parameters
     ----------
-    sweeps, tolerance : as for `Midpoint`; a sweep costs no solve.
+    sweeps, tolerance : as for `Midpoint`; a sweep needs no solve.
     """
 
     sweeps: int = 50
@@ -72,26 +72,26 @@ class McLachlanPerlmutter(OneStep):
 
 
 class Swept(NamedTuple):
-    """The limits of the iteration, for the compiled form."""
+    """Parameters of the compiled form: the limits of the iteration."""
 
     sweeps: int
     tolerance: float
 
 
 class Room(NamedTuple):
-    """Arrays like positions: c, after, still (zero), half, move, v, g. Like momenta: pull, share, ones. change (n,)."""
+    """Workspace: c, after, still (zero), half, move, v, g like positions; pull, share, ones like momenta; change (n,)."""
 
-    c: NDArray
-    after: NDArray
-    still: NDArray
-    half: NDArray
-    move: NDArray
-    v: NDArray
-    g: NDArray
-    pull: NDArray
-    share: NDArray
-    ones: NDArray
-    change: NDArray
+    c: Float
+    after: Float
+    still: Float
+    half: Float
+    move: Float
+    v: Float
+    g: Float
+    pull: Float
+    share: Float
+    ones: Float
+    change: Float
 
 
 @fill(do.room, Swept, _nrt=True)

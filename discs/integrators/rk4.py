@@ -5,19 +5,19 @@ from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Float
 from discs.integrators.base import OneStep, Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import Cost, fill
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import copy, forward
-from discs.skew import Phase, SkewGradient, add
+from discs.skew import Parameters, Phase, SkewGradient, add
 
 
 @dataclass(frozen=True)
 class RK4(OneStep):
-    """Runge-Kutta of order 4 on q' = C(q) pi, pi' = -C(q)^T grad V(q). For few discs: h must stay below about
+    """Runge-Kutta method of order 4 for q' = C(q) pi, pi' = -C(q)^T grad V(q). It suits few discs, as h must stay below about
     0.7 k^2 sqrt(rho/K)."""
 
     name: ClassVar[str] = "rk4"
@@ -30,7 +30,7 @@ class RK4(OneStep):
         shape = system.shape(z.hi, z.lo)
         work.gradients += 4
 
-        def rate(tau: float, dq: NDArray, dpi: NDArray) -> tuple[NDArray, NDArray]:
+        def rate(tau: float, dq: Float, dpi: Float) -> tuple[Float, Float]:
             moved, p = system.moved(shape, dq), z.pi + dpi
             c = system.basis(moved)
             return system.forward(c, p), -system.pull(c, system.gradient(moved), t + tau, z, dq, p)
@@ -48,32 +48,32 @@ class RK4(OneStep):
 
 
 class Explicit(NamedTuple):
-    """For the compiled form: what parts of h the stages are at (4,), and one more; their weights (4,)."""
+    """Parameters of the compiled form. nodes : (5,), places of the stages in units of h, and a last 0. weights : (4,)."""
 
-    nodes: NDArray
-    weights: NDArray
+    nodes: Float
+    weights: Float
 
 
 class Room(NamedTuple):
-    """c, move, v and their total like positions; g, kick and p like momenta."""
+    """Workspace: c, move, v, total like positions; g, kick, p like momenta."""
 
-    c: NDArray
-    move: NDArray
-    v: NDArray
-    total: NDArray
-    g: NDArray
-    kick: NDArray
-    p: NDArray
+    c: Float
+    move: Float
+    v: Float
+    total: Float
+    g: Float
+    kick: Float
+    p: Float
 
 
 @fill(do.room, Explicit, _nrt=True)
-def _room(method: Explicit, chain: Any, state: Phase) -> Room:
+def _room(method: Explicit, chain: Parameters, state: Phase) -> Room:
     c, move, v, total = np.empty_like(state.hi), np.empty_like(state.hi), np.empty_like(state.hi), np.empty_like(state.hi)
     return Room(c, move, v, total, np.empty_like(state.pi), np.empty_like(state.pi), np.empty_like(state.pi))
 
 
 @fill(do.step, Explicit, forceinline=True)
-def _step(method: Explicit, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
+def _step(method: Explicit, chain: Parameters, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     c, move, v, total, g, kick, p = room
     nodes, weights, pi = method.nodes, method.weights, before.pi
     move[:], total[:], kick[:] = 0.0, 0.0, 0.0

@@ -1,1 +1,1 @@
-"""The chains and integrators in compiled form (numba), each the twin of a plain one in NumPy and SciPy."""
+"""Compiled forms (numba) of chains, loads and the driver of integrators; each has a plain twin in NumPy and SciPy."""

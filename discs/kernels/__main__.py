@@ -1,4 +1,4 @@
-"""`python -m discs.kernels`: compile all kernels now, once on a machine, so that no run has to wait for it."""
+"""`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it."""
 
 import subprocess
 import sys
@@ -15,7 +15,8 @@ OWN = ("heading_inertia", "stretch_stiffness", "shear_stiffness")
 
 
 def sharing() -> list[list[Integrator]]:
-    """All methods with a compiled form, those together that share kernels: with parameters of one type, or adaptive."""
+    """All methods with a compiled form, grouped by the kernels that they share: those with parameters of one type, and the adaptive
+    ones."""
     found: dict[type, list[Integrator]] = {}
     for method in (cls() for cls in METHODS.values()):
         if method.compiles:
@@ -24,7 +25,7 @@ def sharing() -> list[list[Integrator]]:
 
 
 def compile_for(law: str) -> None:
-    """Compile every kernel for a kind of chain, of slaved headings by a law of rolling or of "own" ones."""
+    """Compile every kernel for one kind of chain: slaved headings with this law of rolling, or "own" headings."""
     own = law == "own"
     values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + OWN if own else ONES, 1.0)
     chain: Chain | SteeredChain = SteeredChain(**values) if own else Chain(**values, rolling=law)
@@ -38,6 +39,6 @@ def compile_for(law: str) -> None:
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         compile_for(sys.argv[1])
-    else:  # side by side: a processor each
+    else:  # in parallel, one process each
         both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", law]) for law in (*ROLLING, "own")]
         sys.exit(max(process.wait() for process in both))

@@ -1,12 +1,12 @@
-r"""Symmetric banded systems, eliminated from both ends at once: two independent recurrences, which a processor runs side by side.
+r"""Symmetric banded systems, eliminated from both ends at once: two independent recurrences, which a processor runs in parallel.
 
-Pivots are not exchanged: the matrices are I + g A with A positive semidefinite, and g positive or complex with a positive real
+There is no pivoting: the matrices are I + g A with A positive semidefinite, and g positive or complex with a positive real
 part or imaginary part, whose pivots stay away from zero.
 
 Pentadiagonal: a[i] on the diagonal, u[i] couples i and i + 1, w[i] couples i and i + 2; corner[0] couples 0 and 3 and corner[1]
-n - 4 and n - 1 (a ghost disc's bend). Factors overwrite them: reciprocal pivots and multipliers. The rows of the first half are
-eliminated downwards, those of the second half upwards, and two rows in the middle, p and p + 1, remain. Below eight rows one
-elimination downwards does.
+n - 4 and n - 1 (the bend of a ghost disc). The factors, reciprocal pivots and multipliers, overwrite them. The first half of the
+rows is eliminated downwards, the second half upwards; two rows in the middle, p and p + 1, remain. Fewer than eight rows are
+eliminated downwards only.
 """
 
 from discs.kernels.compiled import PART, later, part
@@ -15,13 +15,13 @@ FEW = 8
 
 
 def reciprocal(z):
-    """1/z, for a complex z without the care for overflow that is not needed here."""
+    """1/z; for a complex z without protection against overflow, which is not needed here."""
     return 1 / z
 
 
 @part
 def factor_few(a, u, w, corner):
-    """`factor` by one elimination downwards."""
+    """`factor` by elimination downwards only."""
     n = a.size
     for i in range(n):
         third = corner[0] if i == 0 else (corner[1] if i == n - 4 else 0 * corner[1])
@@ -42,22 +42,22 @@ def factor_few(a, u, w, corner):
 
 
 def at(b, i):
-    """b[i], or where b holds two columns (2, n) both of their entries."""
+    """b[i]; for two right sides (2, n) both entries."""
     return b[..., i]
 
 
 def put(b, i, x):
-    """b[i] = x, for one column or two."""
+    """b[i] = x, for one right side or two."""
     b[..., i] = x
 
 
 def less(x, k, y):
-    """x - k y, for one column or two."""
+    """x - k y, for one right side or two."""
     return x - k * y
 
 
 def times(x, k):
-    """x k, for one column or two."""
+    """x k, for one right side or two."""
     return x * k
 
 
@@ -149,7 +149,7 @@ def factor(a, u, w, corner):
     w[last - 3] -= u[last - 1] * third
     u[last - 2] -= u[last - 1] * second
     a[last - 1] -= u[last - 1] * first
-    # rows i downwards and j upwards; what the next rows need stays in registers
+    # rows i downwards and j upwards; values for the next rows stay in registers
     a0, a1, u0 = a[1], a[2], u[1]
     z0, z1, v0 = a[last - 1], a[last - 2], u[last - 2]
     for i in range(1, n // 2 - 1):
@@ -167,7 +167,7 @@ def factor(a, u, w, corner):
         z1 = a[j - 2] - m2 * below
         v0 = u[j - 2] - m1 * below
     i = n // 2 - 1
-    if n % 2:  # one row more from above
+    if n % 2:  # one more row downwards
         top = reciprocal(a0)
         second = w[i]
         l1, l2 = u0 * top, second * top
@@ -175,7 +175,7 @@ def factor(a, u, w, corner):
         a0 = a1 - l1 * u0
         a1 = a[i + 2] - l2 * second
         u0 = u[i + 1] - l1 * second
-    # a0, a1 came down to p and p + 1; z1, z0 came up to them, on the same entries
+    # a0, a1 are the rows p, p + 1 from above; z1, z0 the same rows from below
     a0 += z1 - a[p]
     a1 += z0 - a[p + 1]
     u0 += v0 - u[p]
@@ -186,8 +186,7 @@ def factor(a, u, w, corner):
 
 @part
 def substitute(a, u, w, corner, b):
-    """Solve with the factors of `factor`, in place; b (n,), or two right sides (2, n), of which the processor does the second
-    while it waits for the first."""
+    """Solve with the factors of `factor`, in place; b (n,), or two right sides (2, n), which a processor solves in parallel."""
     n = a.size
     if n < FEW:
         substitute_few(a, u, w, corner, b)
@@ -213,14 +212,14 @@ def substitute(a, u, w, corner, b):
     if n % 2:
         put(b, i, b0)
         b0, b1 = less(b1, u[i], b0), less(at(b, i + 2), w[i], b0)
-    # what came up to p and p + 1 is c1 and c0, on the same entries
+    # c1, c0 are the entries p, p + 1 from below
     b0 = less(less(b0, -1.0, c1), 1.0, at(b, p))
     b1 = less(less(b1, -1.0, c0), 1.0, at(b, p + 1))
     b1 = times(less(b1, u[p], b0), a[p + 1])
     b0 = less(times(b0, a[p]), u[p], b1)
     put(b, p, b0)
     put(b, p + 1, b1)
-    c0, c1 = b1, b0  # the nearest and the next solved below row j; b0, b1 above row i
+    c0, c1 = b1, b0  # the two solved entries next to row j; b0, b1 those next to row i
     if n % 2:
         i = p - 1
         b0, b1 = less(less(times(at(b, i), a[i]), w[i], b1), u[i], b0), b0

@@ -1,14 +1,14 @@
-"""How kernels are compiled: `kernel` for those called from Python, `part` for what they call, `stub` and `fill` for what differs by
-chain or by method.
+"""Decorators for compiled code: `kernel` for functions called from Python, `part` for functions that kernels call, `stub` and
+`fill` for functions that depend on the chain or the method.
 
-Parts are plain Python functions; numba is told of them, and imported, when the first kernel is. With NUMBA_DISABLE_JIT=1 all run as
-plain Python, for a debugger and to see which lines are reached.
+Parts are plain Python functions. numba is imported, and parts are registered with it, when the first kernel is compiled. With
+NUMBA_DISABLE_JIT=1 all run as plain Python, for debuggers and to measure coverage.
 
-Compiled kernels are cached on disc, so compiling is paid once per machine. numba knows a cached kernel by the file it stands in,
-not by those it calls. So each pair of a method and a chain has its kernel cached in a folder named by the content of the files that
-it may call: those with its forms, and with what these import of parts and forms. It is in NUMBA_CACHE_DIR if that is set, otherwise
-in `__pycache__` beside the kernels, otherwise in the user's cache. Where none can be written every process compiles, and warns of
-it. A folder of earlier content goes when a new one is made, if nothing has used it for a day: another process may.
+Compiled kernels are cached on disc, so each is compiled once per machine. numba identifies a cached kernel by its own file, not by
+the files it calls. So each pair of a method and a chain has its own folder, named by the content of the files that the kernel may
+call: those with its forms, and those of the parts and forms that they import. The folder is in NUMBA_CACHE_DIR if that is set,
+otherwise in `__pycache__` beside the kernels, otherwise in the user's cache. If none can be written, every process compiles, with
+a warning. A new folder replaces folders of earlier content that no process has used for a day.
 """
 
 import hashlib
@@ -29,36 +29,35 @@ from typing import Any
 from discs.warn import warn
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
-# Parts of a kernel: no counting of references, as what they are given is held by the kernel and they make no arrays; no way in
-# from Python.
+# Parts of a kernel count no references, as the kernel holds their arguments and they make no arrays. Python cannot call them.
 PART: dict[str, Any] = OPTIONS | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 HERE = Path(__file__).parent
-CALLED = HERE / "compiled.py", HERE / "limits.py"  # files that every kernel may call
-ROOM = 2**20  # bytes that a kernel may take on disc
-UNUSED = 86_400.0  # seconds after which kernels of earlier content are removed
-CUT = -1, 0, 0  # in place of a step's cost, where Ctrl-C was pressed
-Cost = tuple[int, int, int]  # of a step: gradients, solves, iterations that ended on their limit
+CALLED = HERE / "compiled.py", HERE / "limits.py"  # files that every kernel depends on
+ROOM = 2**20  # bytes on disc that a kernel may need
+UNUSED = 86_400.0  # seconds without use after which kernels of earlier content are removed
+CUT = -1, 0, 0  # the cost of a step that Ctrl-C interrupted
+Cost = tuple[int, int, int]  # of a step: gradients, solves, unconverged iterations
 
-_WAITING: list[Callable[[], object]] = []  # what numba is to be told of
-_MODULES: dict[str, dict[str, Any]] = {}  # those with parts, forms or kernels, and what they hold
+_WAITING: list[Callable[[], object]] = []  # registrations to be made with numba
+_MODULES: dict[str, dict[str, Any]] = {}  # modules with parts, forms or kernels, and their contents
 _FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
 
 
 def later(what: Callable[[], object]) -> None:
-    """Tell numba now if it is imported, else when it is."""
+    """Make a registration with numba: now if numba is imported, otherwise when it is."""
     _WAITING.append(what)
     if "numba" in sys.modules:
         tell_numba()
 
 
 def tell_numba() -> None:
-    """Tell numba of all parts and forms."""
+    """Register all parts and forms with numba."""
     while _WAITING:
         _WAITING.pop(0)()
 
 
 def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """A function that kernels call, and that makes no arrays."""
+    """Decorator: a function that kernels call and that makes no arrays."""
     if function is None:
         return partial(part, **options)
     _MODULES[function.__module__] = function.__globals__
@@ -73,7 +72,7 @@ def part(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def stub(function: Callable[..., Any]) -> Any:
-    """A function that every chain, or every method, has its form for, told by the type of its first argument; see `fill`."""
+    """Decorator: a function with a form for each chain or method, chosen by the type of its first argument; see `fill`."""
 
     @wraps(function)
     def missing(first: Any, *rest: Any) -> Any:
@@ -107,7 +106,7 @@ def fill(of: Any, kind: type, **options: Any) -> Callable[[Callable[..., Any]], 
 
 
 def jit(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that calls parts and forms, compiled for this process alone."""
+    """A function that calls parts and forms, compiled without a cache."""
     import numba
 
     tell_numba()
@@ -115,8 +114,10 @@ def jit(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function called from Python, whose arguments that are NamedTuples, of a chain or of a method, tell what it calls, as do
-    those in them, of a chain's laws and load; compiled at its first call with each."""
+    """Decorator: a function called from Python, compiled at its first call for each combination of parameters.
+
+    The types of its arguments that are NamedTuples (a chain, a method), and of their entries (laws, load), select the forms.
+    """
 
     known: dict[tuple[type, ...], Callable[..., Any]] = {}
 
@@ -134,12 +135,12 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
-    """A kernel for these kinds of parameters, as numba has it."""
+    """The kernel that numba compiles for these types of parameters."""
     import numba
 
     tell_numba()
     files = _files(function, *kinds)
-    if not all(path.is_file() for path in files):  # what is typed into a notebook is not kept
+    if not all(path.is_file() for path in files):  # code in a notebook is not cached
         return jit(function)
     kept = _cache(files, "-".join([function.__name__, *(kind.__name__ for kind in kinds)]))
     if not kept:
@@ -153,7 +154,7 @@ def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
 
 
 def _files(function: Callable[..., Any], *kinds: type) -> tuple[Path, ...]:
-    """The files that a kernel may call with these kinds of parameters."""
+    """The files that a kernel may call with these types of parameters."""
     _MODULES[function.__module__] = function.__globals__
     found: set[str] = set()
     waiting = {function.__module__}.union(*(_FORMS[kind] for kind in kinds))
@@ -166,7 +167,7 @@ def _files(function: Callable[..., Any], *kinds: type) -> tuple[Path, ...]:
 
 
 def _content(files: tuple[Path, ...]) -> str:
-    """What tells kernels that call what stands in these files from all others; in a package not ours, all beside them too."""
+    """A hash of these files, and of the whole folder of those in other packages: it identifies the kernels that call them."""
     folders = {path.parent for path in files if HERE.parent not in path.parents and (path.parent / "__init__.py").exists()}
     sources = sorted({*files, *CALLED, *(source for folder in folders for source in folder.glob("*.py"))})
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
@@ -174,7 +175,7 @@ def _content(files: tuple[Path, ...]) -> str:
 
 @cache
 def _cache(files: tuple[Path, ...], name: str = "") -> str:
-    """Where kernels of a name that call what stands in these files are kept; "" if nothing can be written anywhere."""
+    """The cache folder of the kernels of a name that call these files; "" if none can be written."""
     import numba
     from numba.misc.appdirs import user_cache_dir
 
@@ -196,16 +197,16 @@ def _cache(files: tuple[Path, ...], name: str = "") -> str:
 
 
 def _remove_earlier(kept: Path) -> None:
-    """Remove kernels of the same name and earlier content that no process has used for a day."""
+    """Remove folders of the same kernel and earlier content that no process has used for a day."""
     for other in kept.parent.glob("kernels-*"):
         name = other.name.rpartition("-")[0]
-        if other != kept and name in ("kernels", kept.name.rpartition("-")[0]):  # once they were named by their content alone
+        if other != kept and name in ("kernels", kept.name.rpartition("-")[0]):  # an older version named them by content alone
             with suppress(OSError):
                 if time.time() - other.stat().st_mtime > UNUSED:
                     shutil.rmtree(other)
 
 
-uncached: list[bool] = []  # whether kernels could not be kept
+uncached: list[bool] = []  # not empty if kernels could not be cached
 
 
 def _warn_of_no_cache() -> None:
@@ -219,7 +220,7 @@ def _warn_of_no_cache() -> None:
 
 @contextmanager
 def compiling(say: Callable[[], None], after: float) -> Iterator[None]:
-    """Call `say` once numba has compiled for so many seconds; kernels that it reads from the cache do not count."""
+    """Call `say` after numba has compiled for `after` seconds; reading kernels from the cache does not count."""
     from numba.core import event
 
     notice = threading.Timer(after, say)
@@ -241,9 +242,10 @@ def compiling(say: Callable[[], None], after: float) -> Iterator[None]:
 
 
 def interrupted() -> bool:
-    """Whether Ctrl-C was pressed since the call began; a kernel that hears it ends at once with -1 steps.
+    """Whether Ctrl-C was pressed since the call began; a kernel then returns at once, with -1 steps.
 
-    Asking clears it: the caller has to press again, see `discs.integrators.base.FixedStep`. Plain Python hears it by itself.
+    This call clears the signal, so the caller has to raise it again, see `discs.integrators.base.FixedStep`. Plain Python needs no
+    polling.
     """
     return False
 

@@ -1,8 +1,7 @@
-"""The compiled driver: any method's steps of any chain, with the guards that every run has.
+"""The compiled driver: steps of any method for any chain, with the checks of every run.
 
-Its plain twin is `discs.running.time_loop`.
-
-Methods fill in `step` beside their plain form, in `discs.integrators`; chains what a step asks of them, beside this file.
+Its plain twin is `discs.running.time_loop`. Methods fill in `step` beside their plain form, in `discs.integrators`. Chains fill in
+the functions that steps call, in this folder.
 """
 
 import numpy as np
@@ -13,20 +12,20 @@ from discs.kernels.limits import TURNED
 from discs.kernels.shared import ahead, columns, forward
 from discs.skew import Phase
 
-POLLED = 16  # of so many steps one begins with a look for Ctrl-C; sweeps look for themselves
+POLLED = 16  # steps between two polls of Ctrl-C; sweeps poll it themselves
 
 
 @kernel
 def march(method, chain, state, t, h, steps, bound, first, looks, places, defects, limit):
-    """`steps` steps from a state at the time t, in place; `first` were taken before.
+    """Take `steps` steps from a state at the time t, in place, after `first` earlier ones.
 
-    Returns (taken, gradients, solves, unconverged, lost, passed, doubted, blown). It stops after a step that has `blown`, as its
-    kinetic energy is not below `bound`, and after one in which disc `lost` >= 0 loses its heading: on the straight way that it went
-    or, if the step did not converge or is explicit, on the way that its velocity pointed. The state is then undefined, as it is
-    where `taken` is -1: Ctrl-C was pressed.
+    Returns (taken, gradients, solves, unconverged, lost, passed, doubted, blown). The steps end after one whose kinetic energy
+    exceeds `bound` (`blown`), and after one in which the heading of disc `lost` >= 0 vanishes: on the straight line of its motion
+    or, if the step did not converge or is explicit, along its initial velocity. The state is then undefined. It is undefined too if
+    `taken` is -1, after Ctrl-C.
 
-    The last of `looks` (m,) steps in all is looked at, see `discs.running.step_error`: `defects` (m, 2, rows) and `places` are
-    filled, `passed` counts. It stops before a step that is `doubted`, as its defect is beyond `limit`.
+    The steps whose numbers are in `looks` (m,) are looked at, see `discs.running.step_error`: `defects` (m, 2, rows) and `places`
+    are filled in, and `passed` counts the looks. The steps end before one whose defect exceeds `limit` (`doubted`).
     """
     work, room = do.workspace(chain), do.room(method, chain, state)
     before, after = state, do.like(state)
@@ -92,9 +91,9 @@ def add_up(q, factor, total):
 
 @part
 def judge(start, end, place, defect):
-    """The largest defect of a step, relative to positions; infinite where it hides what it is.
+    """The largest relative defect of a step; infinite if a heading turns by more than TURNED, as whole turns do not show.
 
-    place : third differences, (rows, n), then positions at the `end` of the step. defect : (2, rows), absolute ones, and sizes.
+    place : third differences, (rows, n); then positions at the `end` of the step. defect : (2, rows), defects and sizes, filled in.
     """
     worst = 0.0
     for row in range(end.shape[0]):
@@ -123,7 +122,7 @@ def seen(chain, work, c, hi, lo, v, q):
 
 @kernel
 def look(chain, state, v, q):
-    """v = the velocities at a state, and what `seen` returns."""
+    """v = the velocities at a state; returns the energy and the largest slip, and q as for `seen`."""
     work, c = do.workspace(chain), np.empty_like(v)
     do.settle(chain, work, state.hi, state.lo)
     do.rate(state, chain, work, c, 1.0, v)
@@ -132,7 +131,7 @@ def look(chain, state, v, q):
 
 @kernel
 def observe(chain, hi, lo, v, q):
-    """What `seen` returns at hi + lo and rates v."""
+    """The energy and the largest slip at hi + lo and rates v; q as for `seen`."""
     work, c = do.workspace(chain), np.empty_like(hi)
     do.settle(chain, work, hi, lo)
     do.basis(chain, work, np.zeros_like(hi), c)
@@ -141,7 +140,7 @@ def observe(chain, hi, lo, v, q):
 
 @kernel
 def reduced(chain, t, y, out):
-    """The reduced equations q. = C pi, pi. = -C^T (grad V - f) at a time, y = (q, pi) disc by disc, (n (rows + columns),)."""
+    """The reduced equations q. = C pi, pi. = -C^T (grad V - f) at the time t, y = (q, pi) disc by disc, (n (rows + columns),)."""
     n, rows = chain.weights.shape[1], chain.scale.size
     width = rows + columns(rows)
     work, hi, v, c = do.workspace(chain), np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n))

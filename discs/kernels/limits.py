@@ -1,4 +1,4 @@
-"""Limits that compiled and plain forms share; here because what kernels are cached under covers this folder."""
+"""Limits for both compiled and plain forms. They are in this folder so that a change of them compiles kernels again."""
 
-LOST_HEADING = 1e-3  # |r'| below which a disc of the unit law has lost its heading
-TURNED = 1.0  # radians that a heading turns by in one step, and the step is compared: whole turns would not show
+LOST_HEADING = 1e-3  # |r'| below which a disc of the unit law has no heading
+TURNED = 1.0  # rad; a step in which a heading turns by more is compared, as whole turns do not show in its defect

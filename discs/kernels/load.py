@@ -1,4 +1,4 @@
-"""Loads in compiled form: none, and linear ones; their plain twins are those of `discs.loads`."""
+"""Compiled loads: none, and linear ones. The plain twins are in `discs.loads`."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from discs.kernels.shared import column
 
 
 class Unloaded(NamedTuple):
-    """Nothing acts but the springs and the ground. (A NamedTuple that numba takes must have a field.)"""
+    """No loads. (For numba a NamedTuple must have a field.)"""
 
     loads: int
 

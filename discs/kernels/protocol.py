@@ -1,8 +1,8 @@
-"""What compiled steps ask of a chain, and the driver of a method: stubs, filled in by the type of their first argument.
+"""The interface of compiled chains, methods, laws and loads: stubs, filled in by the type of their first argument.
 
-`chain` and `method` are NamedTuples of parameters. Arrays: positions and moves (rows, n), momenta (columns, n), one column for roll
-and one for turning where discs have their own heading. `work` is what `workspace` made: arrays that a chain's functions share,
-among them the shape of the base position, from which moves are reckoned.
+`chain` and `method` are NamedTuples of parameters. Arrays: positions and moves (rows, n); momenta (columns, n), one column for roll
+and, with own headings, one for turning. `work` is the result of `workspace`: arrays that the functions of a chain share, among them
+the shape of the base position. Moves are relative to the base position.
 """
 
 from discs.kernels.compiled import stub
@@ -10,12 +10,12 @@ from discs.kernels.compiled import stub
 
 @stub
 def workspace(chain):
-    """Room to work in."""
+    """The workspace of a chain."""
 
 
 @stub
 def settle(chain, work, hi, lo):
-    """Take hi + lo as the base position: moves are reckoned from there."""
+    """Make hi + lo the base position."""
 
 
 @stub
@@ -25,7 +25,7 @@ def basis(chain, work, move, c):
 
 @stub
 def pullback(chain, work, state, t, move, c, p, g):
-    """g = C^T (grad V - f) after a move from the base, the positions of `state`, for the C given; f at the time t and v = C p."""
+    """g = C^T (grad V - f) after a move from the base, the positions of `state`, with this C; f at the time t and v = C p."""
 
 
 @stub
@@ -35,14 +35,14 @@ def gradient(chain, work, move, g):
 
 @stub
 def sweep(chain, work, state, t, h, p, move, first):
-    """One sweep of a midpoint step from `state` at the time t, the first or a later one: p and the half step `move`, in place.
+    """One sweep, the first or a later one, of a midpoint step from `state` at the time t: changes p and the half step `move`.
 
-    Returns how far the move changed, in units of its scale."""
+    Returns the largest change of the move, in units of its scale."""
 
 
 @stub
 def factors(chain, g, count):
-    """Room for `count` matrices of `precondition`, real or complex as g is."""
+    """Workspace for `count` matrices of `precondition`, real or complex as g."""
 
 
 @stub
@@ -52,12 +52,12 @@ def pick(chain, matrices, j):
 
 @stub
 def stiffness(chain, work, move, c, matrix):
-    """The real matrix C^T (grad^2 V) C after a move, for the C given; of grad^2 V without what prestress adds."""
+    """matrix = C^T (grad^2 V) C after a move, with this C, real; grad^2 V without the part due to prestress."""
 
 
 @stub
 def precondition(chain, stiff, c, d, g, matrix):
-    """Factors of I + d C^T D C + g C^T (grad^2 V) C, `stiff` being that of `stiffness`, D the damping of the chain's load."""
+    """matrix = factors of I + d C^T D C + g C^T (grad^2 V) C. `stiff` is the result of `stiffness`, D the damping of the load."""
 
 
 @stub
@@ -77,7 +77,8 @@ def vanishing(chain):
 
 @stub
 def lost(chain, work, slope):
-    """A disc whose heading vanishes on the straight way from `slope` (2, n) to the base's, or -1; then `slope` is the base's."""
+    """A disc whose heading vanishes on the straight line from `slope` (2, n) to the slopes of the base, or -1. Afterwards `slope`
+    holds the slopes of the base."""
 
 
 # What the driver asks of a method
@@ -85,26 +86,27 @@ def lost(chain, work, slope):
 
 @stub
 def room(method, chain, state):
-    """Arrays that a method's steps work in, for states of the kind of `state`."""
+    """The workspace of a method, for states like `state`."""
 
 
 @stub
 def step(method, chain, work, room, before, after, t, h):
-    """A step from `before`, the base position, which is left as it is, at the time t to `after`, then the base position; returns
-    its `Cost`."""
+    """A step from `before` (at first the base position, not changed) at the time t to `after` (at last the base position).
+
+    Returns its `Cost`."""
 
 
 @stub
 def jumps(method):
-    """Whether stages jump to and fro, as in explicit steps: a heading that vanishes on the way is then told by the velocity."""
+    """Whether stages may jump across r' = 0, as in explicit steps; vanishing headings are then detected by the velocity."""
 
 
-# What the driver asks of a state, `discs.skew.Phase` or what a method of several steps remembers
+# A state: `discs.skew.Phase`, or the memory of a method of several steps
 
 
 @stub
 def like(state):
-    """Room for another state."""
+    """Arrays for another state."""
 
 
 @stub
@@ -114,22 +116,22 @@ def take(state, to):
 
 @stub
 def kinetic(state, chain, h):
-    """Kinetic energy; of what a method of several steps remembers, half a step h later."""
+    """Kinetic energy; for a method of several steps, half a step h later."""
 
 
 @stub
 def rate(state, chain, work, c, tau, move):
-    """move = tau times the velocities at a state, the base position; c is room for C."""
+    """move = tau times the velocities at a state, the base position; c is workspace for C."""
 
 
 @stub
 def kick(before, after, chain, work, t, h, c, g, defect):
-    """defect = 12 times the error that the change of the force in a step of h from the time t tells of, `discs.running.step_error`.
+    """defect = 12 times the defect of a step h from the time t by the change of the force; see `discs.running.step_error`.
 
-    `after` is the base position; c and g are room like C and C^T grad V."""
+    `after` is the base position; c and g are workspace like C and C^T grad V."""
 
 
-# What a chain or a field asks of its law of rolling, `chain.rolling`; `vanishing` too
+# A law of rolling, `chain.rolling`; `vanishing` too
 
 
 @stub
@@ -139,10 +141,10 @@ def contact(law, radius, half, x, y):
 
 @stub
 def jet(law, z, z1, z2):
-    """h, h', h'' for z, z', z'', complex numbers: as `discs.chains.rolling.law.RollingLaw.jet`."""
+    """h, h', h'' from z, z', z'', complex numbers; as `discs.chains.rolling.law.RollingLaw.jet`."""
 
 
-# What a chain of slaved headings asks of its link law, `chain.links`; links (3, n + 1) as `discs.kernels.slaved` has them
+# A link law, `chain.links`; links (3, n + 1) as in `discs.kernels.slaved`
 
 
 @stub
@@ -152,30 +154,30 @@ def elastic(law, d):
 
 @stub
 def tension(law, ends, before, d, g):
-    """g = mean derivative of V by the links over a step from `before` of which d is the middle; over none if they are the same.
+    """g = mean derivative of V by the links, over a step from `before` with middle d; the derivative at d if they are the same.
 
-    What pulls at ghosts is put on the links that they are made of.
+    The tensions of ghost links are added to the links that define them.
     """
 
 
 @stub
 def assemble(law, ends, before, d, c, one, g, matrix):
-    """Entries of `one` I + g C^T (grad^2 V) C for that step; only how soon sweeps converge depends on them."""
+    """matrix = entries of `one` I + g C^T (grad^2 V) C for that step; they affect only the convergence of sweeps."""
 
 
-# What a chain asks of its load, `chain.load`
+# A load, `chain.load`
 
 
 @stub
 def loaded(load):
-    """Whether there are loads: where not, what they need is left out of the code."""
+    """Whether there are loads; if not, their code is not compiled."""
 
 
 @stub
 def push(load, state, t, move, c, p, factor, g):
-    """g += factor C^T f: loads after a move from the positions of `state`, at the time t and v = C p."""
+    """g += factor C^T f, with f after a move from the positions of `state`, at the time t and v = C p."""
 
 
 @stub
 def guide(load, c, d, g, roll, turn):
-    """Add d C^T D C + g C^T (stiffness) C, which is diagonal, to roll (n,) and, where discs turn by themselves, to turn (n,)."""
+    """Add the diagonal matrix d C^T D C + g C^T (stiffness) C to roll (n,) and, with own headings, to turn (n,)."""

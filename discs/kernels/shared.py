@@ -1,4 +1,4 @@
-"""What chains and methods share. C acts on a disc's own momenta: `column` tells which one moves a row.
+"""Functions of several chains and methods. Each row of C has one entry per disc, for the momentum `column(row)`.
 
 c, v : (rows, n). p : (1, n), or (2, n) with own headings.
 """
@@ -12,13 +12,13 @@ from discs.skew import Phase
 
 @part
 def column(row):
-    """The momentum that moves a row of q: roll, 0, moves x, y and theta; phi turns by its own, 1."""
+    """The momentum of a row of q: 0 (roll) for x, y and theta, 1 (turning) for phi."""
     return row // 3
 
 
 @part
 def columns(rows):
-    """How many momenta a disc of so many rows has."""
+    """The number of momenta of a disc with so many rows."""
     return column(rows - 1) + 1
 
 
@@ -53,7 +53,7 @@ def back(c, g, p):
 
 @part(fastmath={"contract", "nnan", "nsz", "reassoc"})
 def largest(a):
-    """The largest of a (n,), none of which is negative."""
+    """The largest entry of a (n,), which has no negative ones."""
     m = 0.0
     for i in range(a.size):
         m = a[i] if a[i] > m else m
@@ -62,7 +62,7 @@ def largest(a):
 
 @part
 def renew(c, p, tau, move, scale, change):
-    """move = tau C p; returns the largest change, each row in units of its `scale`."""
+    """move = tau C p; returns its largest change, each row in units of its `scale`."""
     furthest = 0.0
     for row in range(c.shape[0]):
         a, q, to = c[row], p[column(row)], move[row]
@@ -140,9 +140,9 @@ def _kick(before, after, chain, work, t, h, c, g, defect):
 
 @part
 def ahead(chain, work, state, h, c, half, slope):
-    """A disc that loses its heading if all go on straight from a state, the base position, for a time h, or -1.
+    """A disc whose heading vanishes if discs move with their velocities at a state, the base position, for a time h; or -1.
 
-    `slope` is the state's; c and half are room like positions.
+    `slope` is that of the state; c and half are workspace like positions.
     """
     do.rate(state, chain, work, c, 0.5 * h, half)
     for row in range(half.shape[0]):

@@ -1,8 +1,8 @@
-"""The chain of slaved headings in compiled form; its derivation and its plain twin are `discs.chains.slaved`.
+"""The compiled chain of slaved headings; `discs.chains.slaved` has the derivation and the plain twin.
 
-Links are held with one more at each end: link j lies before disc j, link j + 1 after it. Around a ring links 0 and n are the
-same; at free ends they are the ghosts that make the headings there central, d_0 = 2 d_1 - d_2 ("springs", "paper") or
-3 d_1 - 3 d_2 + d_3 ("consistent").
+Arrays of links have one more at each end: link j is before disc j, link j + 1 after it. On a ring links 0 and n are the same. At
+free ends they belong to ghost discs, d_0 = 2 d_1 - d_2 ("springs", "paper") or 3 d_1 - 3 d_2 + d_3 ("consistent"), and headings
+there are central differences with them.
 """
 
 from typing import Any, NamedTuple
@@ -20,8 +20,8 @@ from discs.kernels.slaved_matrix import GHOST, PLAIN, RING, Matrix, factor, solv
 
 
 class Slaved(NamedTuple):
-    """Parameters. radius : (n,). weights : (3, n), inertia against each row's rate. rolling, links : of the laws, their kinds tell
-    which."""
+    """Parameters. radius : (n,). weights : (3, n), inertia for each row. rolling, links, load : parameters of the laws and
+    the load; their types select the laws."""
 
     radius: NDArray
     weights: NDArray
@@ -43,7 +43,8 @@ def parameters(
 
 
 class Work(NamedTuple):
-    """base : links of the base position. links, tension : of a position. c : C. step : (3, n), for loads. rhs : (1, n)."""
+    """Workspace. base : links of the base position. links, tension : those of a moved position. c : C. step : (3, n), for loads.
+    rhs : (1, n)."""
 
     base: NDArray
     links: NDArray
@@ -76,7 +77,7 @@ def _pick(chain, m, j):
 
 @part
 def close_ends(ends, d):
-    """The first and last links from the others, rows x and y."""
+    """Set the first and the last link from the others."""
     n = d.shape[1] - 1
     for row in range(2):
         if ends == RING:
@@ -105,7 +106,7 @@ def _settle(chain, work, hi, lo):
 
 @part
 def moved(chain, base, move, d, rows):
-    """Links after a move, the first `rows` rows."""
+    """d = links after a move, in the first `rows` rows."""
     n = move.shape[1]
     for row in range(rows):
         y, b, to = move[row], base[row], d[row]
@@ -118,7 +119,7 @@ def moved(chain, base, move, d, rows):
 
 @part
 def basis_of(chain, d, c):
-    """C of links, r' = (d_i + d_{i+1})/2k."""
+    """c = C for links d, with r' = (d_i + d_{i+1})/2k."""
     n = c.shape[1]
     dx, dy, cx, cy, ct = d[0], d[1], c[0], c[1], c[2]
     radius, mass, spin = chain.radius, chain.weights[0], chain.weights[2]
@@ -163,7 +164,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
     moved(chain, work.base, move, work.links, 2)
     basis_of(chain, work.links, c)
     half = 0.5 * h
-    # links of the half step that this C makes
+    # links after the half step with this C
     for row in range(3):
         f, base, to = c[row], work.base[row], work.links[row]
         for j in range(1, n):

@@ -1,4 +1,4 @@
-"""The linear systems of discs with slaved headings: five diagonals and a corner at each consistent end, closed up for rings."""
+"""The linear systems of discs with slaved headings: five diagonals, a corner at each consistent end, and a border for rings."""
 
 from typing import NamedTuple
 
@@ -11,9 +11,9 @@ PLAIN, GHOST, RING = 0, 1, 2
 
 
 class Matrix(NamedTuple):
-    """A factored matrix: `banded`, and around a ring the columns of the last two discs, which border the rest.
+    """A factored matrix: `banded`, and on a ring the columns of the last two discs, which border the others.
 
-    columns : (2, n), solutions for the border; edge : (9,), the border's six entries and the inverse of its Schur complement.
+    columns : (2, n), solutions for the border. edge : (9,), six entries of the border and the inverse of its Schur complement.
     """
 
     a: NDArray
@@ -51,7 +51,7 @@ def assemble(law, ends, c, one, g, m):
 
 @part
 def border(m):
-    """Factor a ring's matrix: the chain without its last two discs, and what they add."""
+    """Factor the matrix of a ring: the chain without its last two discs, then the border of these two."""
     n = m.a.size
     edge = m.edge
     edge[0], edge[1], edge[2] = m.w[n - 4], m.u[n - 3], m.w[n - 2]  # disc n - 2 with n - 4, n - 3, 0

@@ -1,7 +1,7 @@
-"""The chain of discs with their own heading in compiled form; its derivation and its plain twin are `discs.chains.steered`.
+"""The compiled chain of discs with their own headings; `discs.chains.steered` has the derivation and the plain twin.
 
-Links are held with one more at each end: link j lies before disc j. Around a ring links 0 and n are the same; at free ends they
-have no stiffness.
+Arrays of links have one more at each end: link j is before disc j. On a ring links 0 and n are the same; at free ends they have no
+stiffness.
 """
 
 from typing import Any, NamedTuple
@@ -19,10 +19,10 @@ from discs.kernels.steered_matrix import Matrix, assemble, factor, solve
 
 
 class Steered(NamedTuple):
-    """Parameters. weights : (4, n), inertia against each row's rate. paces : (3, n), rates of contact point, roll and heading per
-    unit of momentum.
+    """Parameters. weights : (4, n), inertia for each row. paces : (3, n), rates of contact point, roll and heading per unit of
+    momentum.
 
-    stiffness : (4, n + 1), k times that against stretch, shear, torsion and bending. shift : (4,), advance along a ring.
+    stiffness : (4, n + 1), k times the stiffness of stretch, shear, torsion and bending. shift : (4,), advance along a ring.
     """
 
     weights: NDArray
@@ -44,7 +44,7 @@ def parameters(
     stiffness: NDArray,
     load: Any = UNLOADED,
 ) -> Steered:
-    """The parameters of a chain and its load; `stiffness` is that of its links, (4, n_links)."""
+    """The parameters of a chain and its load; `stiffness`, (4, n_links), is that of the links."""
     ring = given.ends == "ring"
     padded = np.zeros((4, given.n + 1))
     padded[:, 1 : 1 + stiffness.shape[1]] = stiffness
@@ -54,10 +54,11 @@ def parameters(
 
 
 class Work(NamedTuple):
-    """Of the base position: base (4, n + 1), differences of neighbours; angles (4, n + 1), cosine and sine of headings and of the
-    mean headings of links; strain (4, n + 1).
+    """Workspace.
 
-    Of a position or a step, see `discs.chains.steered`: links, along, tension (4, n + 1), across (2, n + 1), couple (n + 1,).
+    Of the base position: base (4, n + 1), differences of neighbours; angles (4, n + 1), cosine and sine of headings and of the mean
+    headings of links; strain (4, n + 1). Of a moved position or a step, see `discs.chains.steered`: links, along, tension
+    (4, n + 1), across (2, n + 1), couple (n + 1,).
     """
 
     base: NDArray
@@ -128,7 +129,7 @@ def _settle(chain, work, hi, lo):
 
 @part
 def basis_of(chain, work, dphi, c):
-    """C after headings have turned by dphi."""
+    """c = C after headings turned by dphi."""
     cos, sin = work.angles[0], work.angles[1]
     cx, cy, ct, cp = c[0], c[1], c[2], c[3]
     point, roll, heading = chain.paces[0], chain.paces[1], chain.paces[2]
@@ -176,7 +177,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
         for i in range(n):
             b[row, i] = pi[row, i] - p[row, i] - half * b[row, i]
     do.push(chain.load, state, t + half, work.step, c, p, half, b)
-    if first:  # later sweeps of a step make do with its matrix, see `discs.integrators.midpoint`
+    if first:  # later sweeps of a step use the same matrix, see `discs.integrators.midpoint`
         assemble(chain, work, c, 1.0, half * half, m.d, m.o)
         do.guide(chain.load, c, half, half * half, m.d[0], m.d[2])
         factor(chain, m)

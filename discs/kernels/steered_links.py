@@ -1,7 +1,7 @@
-"""The springs between discs with their own heading: geometry, strains and tensions of links, see `discs.chains.steered`.
+"""The links between discs with their own headings: geometry, strains and tensions; see `discs.chains.steered`.
 
-`work` is that of `discs.kernels.steered`. The cosines of a step's angles come from those of its start and of the step: two pairs
-for each disc and sweep.
+`work` is the workspace of `discs.kernels.steered`. Cosines at the end of a step are computed from those at its start and those of
+the change: two pairs for each disc and sweep.
 """
 
 import math
@@ -19,13 +19,13 @@ QUARTER = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.0222662487959
 
 @part(inline="always")
 def whole(x):
-    """The whole number nearest to x, |x| < 2^51: `floor` and choices by it would keep loops from running several places at once."""
+    """The whole number nearest to x, |x| < 2^51. (`floor` and branches on it would prevent vectorised loops.)"""
     return (x + 6755399441055744.0) - 6755399441055744.0
 
 
 @part(inline="always")
 def turn(x):
-    """cos x and sin x to a unit in the last place for |x| < 1e6, without a branch or a call, so that loops run several at once.
+    """cos x and sin x to a unit in the last place for |x| < 1e6, without branches and calls, so that loops are vectorised.
 
     Reduction by quarter turns in three parts and the minimax polynomials of fdlibm (Sun Microsystems, 1993).
     """
@@ -36,7 +36,7 @@ def turn(x):
     half = 0.5 * z
     rest = 1.0 - half
     cos = rest + (((1.0 - rest) - half) + z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
-    # one quarter turn takes (cos, sin) to (-sin, cos), one back to (sin, -cos), two turn the signs
+    # one quarter turn maps (cos, sin) to (-sin, cos), one back to (sin, -cos), two change both signs
     halves = whole(0.5 * quarters)
     odd = quarters - 2.0 * halves
     sign = 1.0 - 2.0 * abs(halves - 2.0 * whole(0.5 * halves))
@@ -46,7 +46,7 @@ def turn(x):
 
 @part
 def strains(chain, d, cos, sin, strain):
-    """Stretch, shear, torsion and bending of links with differences d and mean headings of the given cosine and sine."""
+    """strain = stretch, shear, torsion and bending of links with differences d and mean headings of this cosine and sine."""
     per = 1 / chain.k
     dx, dy, dt, dp = d[0], d[1], d[2], d[3]
     stretch, shear, torsion, bend = strain[0], strain[1], strain[2], strain[3]
@@ -59,7 +59,7 @@ def strains(chain, d, cos, sin, strain):
 
 @part
 def spread(chain, work, y, a, b):
-    """Differences of neighbours of y (4, n) and the means of its headings at links a to b, in `links` and `couple`."""
+    """Differences of neighbours of y (4, n), and means of its headings, at links a to b: into `links` and `couple`."""
     n, first, last = y.shape[1], max(a, 1), min(b, y.shape[1])
     for row in range(4):
         before, after, d = y[row][first - 1 : last - 1], y[row][first:last], work.links[row][first:last]
@@ -77,11 +77,11 @@ def spread(chain, work, y, a, b):
 
 @part
 def secant(work, a, b, k, full):
-    """Mean geometry at links a to b of a step whose half has spread discs by `links`, or (not `full`) of the position moved so.
+    """Mean geometry at links a to b of a step whose half changes them by `links`; if not `full`, that of the position so moved.
 
-    Left in `work`: along, the first row of the matrix that takes (dx, dy) to stretch and shear (the second is that turned by a
-    quarter), across, and the mean strain in `tension`. Short loops over few arrays each, as compilers can run several places
-    at once.
+    Results in `work`: along, the first row of the matrix from (dx, dy) to stretch and shear (the second row is the first one turned
+    by 90 degrees); across; and the mean strain, in `tension`. The loops are short and use few arrays each, so that compilers can
+    vectorise them.
     """
     per = 1 / k
     half, cos, sin = work.couple[a:b], work.turned[0][a:b], work.turned[1][a:b]
@@ -97,7 +97,7 @@ def secant(work, a, b, k, full):
     stretch, shear = work.tension[0][a:b], work.tension[1][a:b]
     if full:
         e0, e1 = work.strain[0][a:b], work.strain[1][a:b]
-        for j in range(half.size):  # at the end of the step: a half turn further, two half steps on
+        for j in range(half.size):  # end of the step: the angle of the half step and the change of links twice
             c, s = along_x[j] * cos[j] - along_y[j] * sin[j], along_y[j] * cos[j] + along_x[j] * sin[j]
             x, y2 = bx[j] + 2 * dx[j], by[j] + 2 * dy[j]
             stretch[j] = 0.5 * (e0[j] + ((c * x + s * y2) * per - 1))
@@ -128,7 +128,7 @@ def secant(work, a, b, k, full):
 
 @part
 def tensions(work, stiffness, a, b, k):
-    """What links a to b pull with, from their mean strain and geometry: tension (in place of the strain) and couple."""
+    """Tensions and couples of links a to b from their mean strain and geometry; `tension` holds the strain before."""
     per = 1 / k
     k0, k1 = stiffness[0][a:b], stiffness[1][a:b]
     along_x, along_y, across_x, across_y = work.along[0][a:b], work.along[1][a:b], work.across[0][a:b], work.across[1][a:b]
@@ -149,7 +149,7 @@ def tensions(work, stiffness, a, b, k):
 
 @part
 def pull(chain, work, y, full):
-    """Geometry and tensions after a step or a move y, some links at a time so that what lies between stays at hand."""
+    """Geometry and tensions after a step or a move y, TILE links at a time, so that intermediate results stay in the cache."""
     links = work.couple.size
     for a in range(0, links, TILE):
         b = min(a + TILE, links)
@@ -160,7 +160,7 @@ def pull(chain, work, y, full):
 
 @part
 def pulled(work, c, g):
-    """g = C^T grad V from the tensions."""
+    """g = C^T grad V, from the tensions."""
     cx, cy, ct, cp = c[0], c[1], c[2], c[3]
     x, y, t, p, couple = work.tension[0], work.tension[1], work.tension[2], work.tension[3], work.couple
     roll, heading = g[0], g[1]

@@ -1,4 +1,4 @@
-"""The linear system of a step of discs with own headings: its entries, and around a ring its border."""
+"""The linear system of a step of discs with own headings: its entries, factors and solution; on a ring with a border."""
 
 from typing import NamedTuple
 
@@ -10,9 +10,9 @@ from discs.kernels.compiled import part
 
 
 class Matrix(NamedTuple):
-    """A factored matrix: `blocks`, and around a ring the columns of the last disc, which borders the rest.
+    """A factored matrix: `blocks`, and on a ring the columns of the last disc, which border the others.
 
-    columns : (2, 2, n), solutions for the border; edge : (11,), the border's two blocks and the inverse of its Schur complement.
+    columns : (2, 2, n), solutions for the border. edge : (11,), two blocks of the border and the inverse of its Schur complement.
     """
 
     d: NDArray
@@ -33,7 +33,7 @@ def assemble(chain, work, c, one, g, d, o):
     for i in range(n):
         p[i], q[i], r[i] = one, 0.0, one
     o0, o1 = o[0], o[1]
-    for side in range(2):  # the links before discs and after them: along and across C, and torsion and bending of links
+    for side in range(2):  # the links before discs, then those after them
         sign = 1.0 - 2.0 * side
         ax, ay, bx, by = along_x[side:], along_y[side:], across_x[side:], across_y[side:]
         s0, s1, s2, s3 = k0[side:], k1[side:], k2[side:], k3[side:]
@@ -48,7 +48,7 @@ def assemble(chain, work, c, one, g, d, o):
         for i in range(n):
             b = cp[i] * per
             r[i] += g * (0.25 * cp[i] * cp[i] * (s0[i] * bx[i] * bx[i] + s1[i] * by[i] * by[i]) + s3[i] * b * b)
-    # o0, o1 hold what the links after discs make of these discs; the same links make n1, q1 of the next ones
+    # o0, o1 are stretch and shear of the link after disc i by its roll, as n0, q0 in `couple` but for the sign
     for i in range(n - 1):
         couple(i, i + 1, c, g, per, chain.stiffness, work.along, work.across, o)
     if chain.ring:
@@ -60,8 +60,8 @@ def assemble(chain, work, c, one, g, d, o):
 
 @part
 def couple(i, j, c, g, per, stiffness, along, across, o):
-    """The block of disc i and the next, j, from the link i + 1 between them; o[:2, i] are its stretch and shear by disc i's
-    roll."""
+    """The block of disc i and the next disc j, from the link i + 1 between them. Before, o[:2, i] are stretch and shear of the
+    link by the roll of disc i."""
     link = i + 1
     n0, q0 = -o[0, i], -o[1, i]
     n1, q1 = along[0, link] * c[0, j] + along[1, link] * c[1, j], along[0, link] * c[1, j] - along[1, link] * c[0, j]
@@ -76,7 +76,7 @@ def couple(i, j, c, g, per, stiffness, along, across, o):
 
 @part
 def border(m):
-    """Factor a ring's matrix: the chain without its last disc, and what that adds."""
+    """Factor the matrix of a ring: the chain without its last disc, then the border of that disc."""
     last = m.d.shape[1] - 1
     e, first, second = m.edge, m.columns[0, :, :last], m.columns[1, :, :last]
     for i in range(4):
@@ -103,7 +103,7 @@ def border(m):
 
 @part
 def across_border(e, row, b):
-    """Row of the last disc's coupling to the others, times b (2, n - 1)."""
+    """A row of the coupling of the last disc to the others, times b (2, n - 1)."""
     end = b.shape[1] - 1
     return e[2 * row] * b[0, 0] + e[2 * row + 1] * b[1, 0] + e[4 + row] * b[0, end] + e[6 + row] * b[1, end]
 

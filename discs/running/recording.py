@@ -173,7 +173,7 @@ class Recording(Rows):
         with safe.fresh(self.path, room(head, shapes)) as new:
             FrameFile.create(new.name, head, shapes).__exit__()
             if self.path.exists():
-                raise ValueError(f"{self.path} was made by something else while the run began; give another path")
+                raise ValueError(f"{self.path} was created by another process while the run began; give another path")
         self.file, self.empty = FrameFile.open(self.path, writable=True), True
 
     def write(self, f: int, found: dict[str, Any]) -> None:
@@ -276,4 +276,4 @@ def kept_settings(path: str | Path, tol: float | Mapping[str, float] | None) -> 
         searched = of_search(stats)
         return from_settings(str(stats["settings"])), checks.number("dt", stats["dt"], positive=True), searched
     except (KeyError, ValueError) as error:
-        raise ValueError(f"{path} holds no run that can go on: {error}; give another path, or delete it") from None
+        raise ValueError(f"{path} holds no run that can continue: {error}; give another path, or delete it") from None

@@ -162,7 +162,7 @@ def doubts(stats: Stats) -> list[str]:
         found.append(f"{stuck} of {steps} steps did not converge")
     error = stats.get("step_error")
     if isinstance(error, float) and error > WARNED:
-        off = f"by about {100 * error:.0f} %" if error < 1 else "altogether"
+        off = f"by about {100 * error:.0f} %" if error < 1 else "by 100 % or more"
         found.append(f"dt = {_number(stats.get('dt')):.3g} is too long for this motion, positions or angles may be off {off}")
     return found
 

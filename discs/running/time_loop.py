@@ -242,7 +242,7 @@ class March:
         return lost
 
     def _gave_up(self, error: ArithmeticError) -> SimulationError:
-        return SimulationError(f"the run could not go on: {error}", self.step, self.step * self.h, 0)
+        return SimulationError(f"the run failed: {error}", self.step, self.step * self.h, 0)
 
     def _accept(self, twin: FixedStep, previous: Memory, tally: Tally) -> int:
         """Count and check compiled steps from the memory `previous`; returns how many they are."""
@@ -288,6 +288,6 @@ class March:
         elif self.work.unconverged:
             cause = f"dt = {self.h:g} is too large for the iteration to converge: take a smaller dt or 'midpoint'"
         else:
-            cause = "the step has lost all digits: take a smaller dt, fewer discs or softer springs"
+            cause = "rounding dominates the steps: take a smaller dt, fewer discs or softer springs"
         what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
         raise SimulationError(f"the run blew up, {what}; likely {cause}", step, time, disc)

@@ -1,33 +1,37 @@
-"""A run to a tolerance: which method, which step.
+"""Runs to a tolerance: the choice of method and step.
 
-Given a problem, tolerances and frames, find a run and the errors of what it records.
+Input: a problem, tolerances and frames. Output: a run within the tolerances, with estimates of its errors.
 
-1. Run with FEWEST steps, and with twice as many and one (steps that alternate are not to agree by chance).
-2. The run with shorter steps measures the error of the one before. Errors C (h r)^p and C h^p differ by C (h r)^p (1 - r^-p): the
-   longer steps err by d/(1 - r^-p), d the largest difference over discs and frames. SAFETY times that, and what sweeps may leave,
-   is the estimate. It hardly depends on p. So the run with the *longer* steps is the result: its error is known. That of the
-   shorter ones, d/(r^p - 1), is known only as well as p, which changes by up to 4 from run to run while waves are not yet resolved.
-3. Three runs show p: the last measures the errors of both before. After two runs p = 1. Estimates count on MOST_ORDER at most.
-4. If the estimate is within every tolerance, that is the result. If not, go to 2 with more steps, by a factor within GROWTH: so
-   many that C h^p reaches the tolerance over AIM.
-5. The error has stalled if p is at most LEAST_ORDER. "auto" takes a method of higher order after two stalls in a row. Where there
-   is none, a stall asks for the cause: a run whose positions start one unit in the last place away. If it differs by a tenth of the
-   error or more, rounding is the limit, and `NotReached` is raised. For tolerances below FINE such a run is made as soon as errors
-   are below RESOLVED; if it differs by more than the tolerance, no step can help.
-6. A run that fails, or whose sweeps do not converge, is followed by one of twice as many steps. The motion itself ends where a disc
-   loses its heading: told by its |r'| a step before, and by runs of two steps that lose it at one time.
+1. Run with FEWEST steps, then with twice as many and one more. (An odd number, as a mode that alternates from step to step could
+   agree by chance.)
+2. Estimate the error of the run with longer steps from the run with shorter ones. Errors C (h r)^p and C h^p differ by
+   C (h r)^p (1 - r^-p), so the error of the longer steps is d/(1 - r^-p), with d the largest difference over discs and frames. The
+   estimate is SAFETY times that, plus the error left by sweeps. It hardly depends on p, so the run with the *longer* steps is the
+   result. The error of the shorter ones, d/(r^p - 1), depends on p, which varies by up to 4 from run to run while waves are not
+   resolved.
+3. Three runs give p: the last one is the reference for the errors of the two before. After two runs p = 1. Estimates use at most
+   MOST_ORDER.
+4. If the estimate is within every tolerance, stop. Otherwise go to 2 with more steps, by a factor within GROWTH, such that C h^p is
+   the tolerance over AIM.
+5. The error has stalled if p is at most LEAST_ORDER. After two stalls in a row "auto" takes a method of higher order. If there is
+   none, a stalled run is repeated with initial positions changed by one unit in the last place. If the two differ by a tenth of the
+   error or more, rounding is the limit, and `NotReached` is raised. For tolerances below FINE this test is made as soon as errors
+   are below RESOLVED; if the difference exceeds the tolerance, no step can reach it.
+6. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
+   ends there, provided that its |r'| one step before is below ENDED and that two runs in a row lose it at the same time.
 
-Sweeps converge to a tolerance that leaves SWEPT of what is asked for after all steps (`discs.running.estimates.sweeps_to`). The
-constants in capitals were found by experiment, on random problems of other seeds than those of docs/trust.md.
+The tolerance of sweeps is such that all steps together leave an error of SWEPT times the tolerance
+(`discs.running.estimates.sweeps_to`). The constants in capitals were found by experiment, on random problems with other seeds than
+those of docs/trust.md.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find, from_settings
 from discs.problem import Problem
 from discs.running import estimates
@@ -37,32 +41,32 @@ from discs.running.suggest import suggest_dt
 from discs.running.time_loop import SimulationError
 from discs.solution import Solution
 
-USUAL = 1e-3  # the tolerance where none is given
+USUAL = 1e-3  # the default tolerance
 LEAST = 1e-12  # the least tolerance: some thousand times the rounding of a position
-LOOSE = 3e-4  # from here on "auto" begins with the midpoint method
-FEWEST = 20  # steps to begin with
-PROBES = 101  # frames that runs are compared at during the search, at most
-GROWTH = 1.5, 3.0  # of the number of steps from run to run
-AIM = 1.3  # times fewer errors than the order foretells are aimed at
-RESOLVED = 1e-2  # relative error: from here on a motion tells what rounding does to it
-FINE = 1e-6  # tolerances below are held against rounding first
-ENDED = 0.01  # |r'| of a disc a step before it loses its heading; where it is larger, the step is too long
-ATTEMPTS, FAILURES = 24, 12  # runs, and those of them that may stop early
+LOOSE = 3e-4  # least tolerance at which "auto" begins with the midpoint method
+FEWEST = 20  # steps of the first run
+PROBES = 101  # frames at which runs are compared during the search, at most
+GROWTH = 1.5, 3.0  # least and largest growth of the number of steps from run to run
+AIM = 1.3  # the next run aims at the tolerance over this
+RESOLVED = 1e-2  # relative error below which the effect of rounding is tested
+FINE = 1e-6  # tolerance below which the effect of rounding is tested early
+ENDED = 0.01  # |r'| of a disc one step before it loses its heading; if it is larger, the step is too long
+ATTEMPTS, FAILURES = 24, 12  # runs at most, and failures among them
 
 WANTED = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y"), "contact_force": ("contact_force",)}
-LADDER = Midpoint(), Gauss6(), Gauss8()  # what "auto" takes, one after the other
+LADDER = Midpoint(), Gauss6(), Gauss8()  # the methods of "auto", in this order
 
-Run = Callable[[Problem, Integrator, float, NDArray], Solution]
+Run = Callable[[Problem, Integrator, float, Float], Solution]
 
 
 def names(problem: Problem, want: Iterable[str] = ()) -> tuple[str, ...]:
-    """The quantities that a run records and a tolerance can bind."""
+    """The recorded quantities that a tolerance can apply to."""
     system = problem.system
     return (*system.rows, *system.rates[2:], *(name for key in want for name in WANTED.get(key, ())))
 
 
 def methods_for(method: str | Integrator, tol: float) -> tuple[Integrator, ...]:
-    """The integrators for a tolerance: the first, and those that follow where one stalls."""
+    """The integrators for a tolerance: the first one, and those to take after a stall."""
     if method == "auto":
         return LADDER if tol >= LOOSE else LADDER[1:]
     integrator = find(method)
@@ -75,31 +79,32 @@ def to_tolerance(
     problem: Problem,
     method: str | Integrator,
     tol: float | Mapping[str, float],
-    times: NDArray,
+    times: Float,
     run: Run,
     want: Iterable[str] = (),
 ) -> Solution:
-    """Run with shorter and shorter steps until a run is known to be within the tolerance; the algorithm is that of the module.
+    """Run with shorter and shorter steps until the estimated error is within the tolerance; the algorithm is above.
 
     Parameters
     ----------
     problem, method : as `simulate` takes them.
-    tol : largest error over discs and frames, relative to the largest value: of x, y, theta (and phi), or of the quantities named.
+    tol : tolerance of the largest error over discs and frames, relative to the largest value, for x, y, theta (and phi) or for the
+        quantities named.
     times : frames, (F,).
     run : (problem, integrator, dt, times) -> Solution.
-    want : what is recorded besides.
+    want : further quantities to record.
 
     Returns
     -------
-    Solution with `error_estimate` of every quantity recorded, over all frames. stats["attempts"] counts the runs, and
-    stats["limited_by"] says what made it as accurate as it is: "tolerance"; "fewest steps", where its method went with no longer
-    steps, or "sweeps", most of the estimate: then the error may be far below the tolerance, or the estimate.
+    Solution with `error_estimate` of every recorded quantity, over all frames. stats["attempts"] is the number of runs.
+    stats["limited_by"] says what determined the accuracy: "tolerance"; "fewest steps", if there was no run with longer steps; or
+    "sweeps", if they are most of the estimate. In the last two cases the error may be far below the tolerance or the estimate.
 
     Raises
     ------
-    ValueError : for a tolerance below what doubles can reach, or of what is not recorded.
+    ValueError : for a tolerance below the accuracy of doubles, or for a quantity that is not recorded.
     NotReached : if the tolerance is not reached.
-    SimulationError : if the motion ends before, or runs fail at every step.
+    SimulationError : if the motion ends before the last frame, or if runs fail with every step.
     """
     bound = checks.tolerances(tol, names(problem, want), problem.system.rows, LEAST)
     integrator, *higher = methods_for(method, min(bound.values()))
@@ -108,7 +113,7 @@ def to_tolerance(
         return _told(start, dict.fromkeys(estimates.compared(start), 0.0), tol, 1, "fewest steps")
     end, some = float(times[-1]), some_of(times)
     steps = _fewest(problem, integrator, end)
-    runs: list[Solution] = []  # of one method, each with shorter steps than the one before, three at most
+    runs: list[Solution] = []  # of one method, at most three, with shorter and shorter steps
     size: dict[str, float] = {}
     failure: SimulationError | None = None
     looked, stalls, failures = False, 0, 0
@@ -165,8 +170,8 @@ def to_tolerance(
     raise NotReached(min(bound.values()), worst, best.stats["dt"], None, best)
 
 
-def some_of(times: NDArray) -> NDArray:
-    """The frames that the search looks at, of all."""
+def some_of(times: Float) -> Float:
+    """The times at which the search compares runs, at most PROBES."""
     return times if times.size <= PROBES else times[np.linspace(0, times.size - 1, PROBES).round().astype(int)]
 
 
@@ -175,7 +180,7 @@ class NotReached(SimulationError):
 
     Attributes
     ----------
-    best : the last run whose error is known, with its estimate.
+    best : the last run with an estimate of its error.
     """
 
     def __init__(self, tol: float, worst: float, dt: float, floor: float | None, best: Solution) -> None:
@@ -183,7 +188,7 @@ class NotReached(SimulationError):
         if floor is None:
             why = f"and {ATTEMPTS} runs with smaller and smaller steps were made; take a larger tol or another method"
         else:
-            why = f"and runs that start one unit in the last place apart differ by {tol * floor:.1e}, so rounding is what is left; "
+            why = f"and runs that start one unit in the last place apart differ by {tol * floor:.1e}, so rounding is the limit; "
             why += "take a larger tol, or end the run earlier"
         super().__init__(f"{what}, {why}", best.stats["steps"], best.t[-1], 0)
         self.best, self._given = best, (tol, worst, dt, floor, best)
@@ -193,7 +198,7 @@ class NotReached(SimulationError):
 
 
 def _sharpened(integrator: Integrator, free: bool, tolerance: float) -> Integrator:
-    """The integrator with its sweeps converged to a tolerance, or to a smaller one of its own unless that is `free`."""
+    """The integrator with this tolerance of sweeps; unless `free`, with its own one if that is smaller."""
     return integrator.with_sweeps(tolerance if free else min(tolerance, integrator.sweep_tolerance))
 
 
@@ -203,13 +208,13 @@ def _worst(errors: Mapping[str, float], bound: Mapping[str, float], size: Mappin
 
 
 def _told(run: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int, limit: str) -> Solution:
-    """The run with what was found out about it."""
+    """The run with its estimates and the stats of the search."""
     told: Stats = {"tol": dict(tol) if isinstance(tol, Mapping) else tol, "attempts": attempts, "limited_by": limit}
     return replace(run, error_estimate=errors, stats=run.stats | told)
 
 
 def _fewest(problem: Problem, integrator: Integrator, end: float) -> int:
-    """Steps to begin with."""
+    """The number of steps of the first run."""
     if not np.isfinite(integrator.stability_limit):
         return FEWEST
     return max(FEWEST, int(np.ceil(end / suggest_dt(problem, integrator))))

@@ -76,7 +76,7 @@ def test_tolerance_own_headings_and_overwrite(tmp_path, capsys):
         (["run", "--n", "2"], "at least 3"),
         (["run", "--t", "-1"], "duration must be a positive finite number"),
         (["run", "--dt", "0.1", "--tol", "0.1"], "give dt or tol, not both"),
-        (["run", "--length", "1e-290"], "length makes the discs' spacing 1.5873e-292; it must be between"),
+        (["run", "--length", "1e-290"], "length gives the discs a spacing of 1.5873e-292; it must be between"),
         (["run", "--dt", "1e-300"], "more than can be counted"),
         (["run", "--shear-stiffness", "1"], "parameter of the chain must be one of"),
         (["run", "--rolling", "own", "--ends", "consistent"], "must be one of 'springs'"),

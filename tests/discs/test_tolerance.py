@@ -118,7 +118,7 @@ def test_a_method_that_stalls_is_followed_by_one_of_higher_order():
 def test_rounding_is_shown_where_it_is_the_limit():
     """Rolling sideways all waves grow: a unit in the last place is far more than 1e-11 at the end."""
     problem = lump(rolling_rod(omega=3.0, amplitude=0.01, duration=6.0), 33)
-    words = r"tol = 1e-11 was not reached: .* one unit in the last place apart differ by .*, so rounding is what is left"
+    words = r"tol = 1e-11 was not reached: .* one unit in the last place apart differ by .*, so rounding is the limit"
     with pytest.raises(SimulationError, match=words) as caught:
         simulate(problem, "gauss8", tol=1e-11, frames=3, progress=False)
     assert caught.value.best.stats["attempts"] < ATTEMPTS
@@ -215,7 +215,7 @@ def test_coordinates_that_hardly_move_are_resolved():
 def test_tolerances_below_rounding_are_refused_after_a_look(monkeypatch):
     """One unit in the last place makes more than 1e-12 of y: nothing finer than the runs that resolve the motion is tried."""
     problem = lump(rolling_rod(omega=3.0, amplitude=0.01, duration=3.0), 33)
-    with pytest.raises(NotReached, match="rounding is what is left") as caught:
+    with pytest.raises(NotReached, match="rounding is the limit") as caught:
         simulate(problem, tol=1e-12, frames=3, progress=False)
     assert caught.value.best.error_estimate["y"] > 1e-8
     assert caught.value.best.stats["steps"] < 500

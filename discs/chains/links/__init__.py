@@ -1,4 +1,4 @@
-"""Link laws, one file each: the springs of discs with slaved headings, by their strains. `law` says what each must give."""
+"""Link laws, one file each: the elastic energy of discs with slaved headings. `law` defines the interface."""
 
 from discs import checks
 from discs.chains.links.law import LinkLaw
@@ -9,7 +9,7 @@ CURVATURE: dict[str, type[LinkLaw]] = {law.name: law for law in (LinearCurvature
 
 
 def find(curvature: str, stretching: object) -> type[LinkLaw]:
-    """The law of this name; ValueError for an unknown one, and for one that takes no stretch stiffness where there is some."""
+    """The law of this name; ValueError if it is unknown, or takes no stretch stiffness where one is given."""
     law = CURVATURE[checks.choice("curvature", curvature, CURVATURE)]
     if stretching and not law.stretches:
         fitting = " or ".join(repr(name) for name, other in CURVATURE.items() if other.stretches)

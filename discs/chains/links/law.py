@@ -1,8 +1,9 @@
-"""What a link law is; see `discs.chains.links`."""
+"""The interface of a link law; see `discs.chains.links`."""
 
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from numpy.typing import NDArray
+from discs.arrays import Complex, Float
+from discs.skew import Parameters, Secant
 
 if TYPE_CHECKING:
     from discs.chains.chain import Chain
@@ -14,10 +15,10 @@ class LinkLaw(Protocol):
     Attributes
     ----------
     name : as given to `Chain(curvature=...)` and `Rod(curvature=...)`.
-    quadratic : whether V is, so that secants do not depend on the step.
-    end_bends : whether "consistent" ends carry a bend.
+    quadratic : whether V is quadratic; secants then do not depend on the step.
+    end_bends : whether "consistent" ends have a bending spring.
     stretches : whether it takes a `stretch_stiffness`.
-    directed : whether links need a direction, d != 0.
+    directed : whether it needs d != 0.
     """
 
     name: ClassVar[str]
@@ -29,26 +30,26 @@ class LinkLaw(Protocol):
     def __init__(self, chain: "Chain") -> None: ...
 
     @staticmethod
-    def density(bending: float, stretching: float, z: NDArray, z1: NDArray) -> NDArray:
-        """Twice the energy per length of bending and stretch for r' = z and r'' = z1, complex numbers x + i y of any shape."""
+    def density(bending: float, stretching: float, z: Complex, z1: Complex) -> Float:
+        """Twice the energy of bending and stretch per length, for r' = z and r'' = z1, complex numbers x + i y of any shape."""
 
     @property
-    def parameters(self) -> Any:
-        """For the compiled form: a NamedTuple that stubs of `discs.kernels.protocol` are filled for. None if there is none: runs
-        then take the plain engine."""
+    def parameters(self) -> Parameters:
+        """For the compiled form: a NamedTuple whose type the stubs `elastic`, `tension` and `assemble` of `discs.kernels.protocol`
+        are filled in for. None if there is none: runs then take the plain engine."""
 
-    def potential(self, d: NDArray) -> float:
-        """V."""
+    def potential(self, d: Float) -> float:
+        """V of links."""
 
-    def polarised(self, d: NDArray, other: NDArray) -> float:
-        """The symmetric bilinear form of which V is the square; ValueError unless V is quadratic."""
+    def polarised(self, d: Float, other: Float) -> float:
+        """The symmetric bilinear form V(d, d') with V(d, d) = V(d); ValueError unless V is quadratic."""
 
-    def secant(self, d: NDArray, change: NDArray) -> Any:
+    def secant(self, d: Float, change: Float) -> Secant:
         """The mean geometry of a step that changes the links."""
 
-    def tension(self, secant: Any) -> NDArray:
-        """A discrete gradient over the step, (3, n_links): tension . change is the change of V."""
+    def tension(self, secant: Secant) -> Float:
+        """A discrete gradient of V over the step, (3, n_links): tension . change is the change of V."""
 
-    def stiffness(self, secant: Any, c: NDArray) -> NDArray:
-        """Bands of C^T B^T (stiffness) B C as `RollingDiscs.stiffness` gives them. Only how soon sweeps converge depends on
-        them."""
+    def stiffness(self, secant: Secant, c: Float) -> Float:
+        """Bands of C^T B^T (stiffness) B C, as `RollingDiscs.stiffness` returns them. They affect only the convergence of
+        sweeps."""

@@ -1,12 +1,12 @@
-"""The paper's link law, linear curvature: bending energy K |r''|**2/2, so that V is quadratic."""
+"""The paper's link law, linear curvature: bending energy K |r''|**2/2; V is quadratic."""
 
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.typing import NDArray
 
+from discs.arrays import Complex, Float
 from discs.chains import stencils
 from discs.chains.links.law import LinkLaw
 from discs.chains.rolling_discs import folded
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 
 class LinearCurvature(LinkLaw):
-    """Bending energy K |r''|**2/2; the secant of a step is its middle links.
+    """Bending energy K |r''|**2/2. The secant of a step is the mean of its links.
 
     Attributes
     ----------
-    bend : (n,), K w/k**4, against `stencils.bends`; zero where there is no spring.
-    twist : (n_links,), beta/k, against the difference of theta.
+    bend : (n,), K w/k**4, stiffness for `stencils.bends`; zero where there is no spring.
+    twist : (n_links,), beta/k, stiffness for differences of theta.
     """
 
     name = "linear"
     quadratic, end_bends, stretches, directed = True, True, False, False
 
     @staticmethod
-    def density(bending: float, stretching: float, z: NDArray, z1: NDArray) -> NDArray:
+    def density(bending: float, stretching: float, z: Complex, z1: Complex) -> Float:
         return bending * np.abs(z1) ** 2
 
     def __init__(self, chain: "Chain") -> None:
@@ -41,25 +41,25 @@ class LinearCurvature(LinkLaw):
         self.twist = np.asarray(chain.torsion_stiffness) / chain.k
         self._order = folded(chain.n) if chain.ends == "ring" else None
 
-    def potential(self, d: NDArray) -> float:
+    def potential(self, d: Float) -> float:
         return self.polarised(d, d)
 
-    def polarised(self, d: NDArray, other: NDArray) -> float:
-        """The symmetric bilinear form of which V is the square."""
+    def polarised(self, d: Float, other: Float) -> float:
+        """The symmetric bilinear form V(d, d') with V(d, d) = V(d)."""
         bends, others = stencils.bends(d[:2], self._ends), stencils.bends(other[:2], self._ends)
         return 0.5 * float((self.bend * bends * others).sum() + (self.twist * d[2]) @ other[2])
 
-    def secant(self, d: NDArray, change: NDArray) -> NDArray:
+    def secant(self, d: Float, change: Float) -> Float:
         return d + 0.5 * change
 
-    def tension(self, secant: NDArray) -> NDArray:
+    def tension(self, secant: Float) -> Float:
         tension = np.empty_like(secant)
         moments = self.bend * stencils.bends(secant[:2], self._ends)
         tension[:2] = stencils.gathered(stencils.pull(moments, "springs"), self._ends)
         tension[2] = self.twist * secant[2]
         return tension
 
-    def stiffness(self, secant: NDArray, c: NDArray) -> NDArray:
+    def stiffness(self, secant: Float, c: Float) -> Float:
         if self._order is not None:
             c = c[:, self._order]
         width, n = len(self._ordered) - 1, self._n
@@ -68,8 +68,8 @@ class LinearCurvature(LinkLaw):
             matrix[width - j, j:] = (band[:, j:] * c[:, j:] * c[:, : n - j]).sum(axis=0)
         return matrix
 
-    def bands(self) -> tuple[NDArray, NDArray]:
-        """grad^2 V by x or y (4, n), and by theta (2, n): [j, i] couples discs i and i + j, around a ring n and 0 too."""
+    def bands(self) -> tuple[Float, Float]:
+        """grad^2 V by x or y (4, n), and by theta (2, n): [j, i] couples discs i and i + j (modulo n on a ring)."""
         after = self.twist if self._ends == "ring" else np.append(self.twist, 0.0)
         return stencils.bend_bands(self.bend, self._ends), np.array([np.roll(after, 1) + after, -after])
 
@@ -90,8 +90,8 @@ class LinearCurvature(LinkLaw):
         return LinearSprings(self.bend, torsion, hessian[:3], corner, twist)
 
     @cached_property
-    def _ordered(self) -> NDArray:
-        """The bands in the system's order, (width + 1, 3, n): [j, :, i] couples discs i - j and i; no more than are not zero."""
+    def _ordered(self) -> Float:
+        """The bands in the system's order, (width + 1, 3, n): [j, :, i] couples discs i - j and i; without bands of zeros."""
         place = np.arange(self._n) if self._order is None else np.argsort(self._order)
         found = []
         for rows, bands in zip(([0, 1], [2]), self.bands(), strict=True):
@@ -105,8 +105,8 @@ class LinearCurvature(LinkLaw):
         return ordered
 
 
-def _symmetric(bands: NDArray) -> "scipy.sparse.csr_array":
-    """The matrix, (n, n), of bands as `LinearCurvature.bands` gives them."""
+def _symmetric(bands: Float) -> "scipy.sparse.csr_array":
+    """The matrix (n, n) of bands as `LinearCurvature.bands` returns them."""
     n = bands.shape[1]
     j, first = np.nonzero(bands)
     second, values = (first + j) % n, bands[j, first]
@@ -116,21 +116,21 @@ def _symmetric(bands: NDArray) -> "scipy.sparse.csr_array":
 
 
 class LinearSprings(NamedTuple):
-    """Parameters of the compiled form. bend : (n,), against the difference of a disc's links. torsion : (n + 1,), beta/k.
+    """Parameters of the compiled form. bend : (n,), stiffness for the change of links at a disc. torsion : (n + 1,), beta/k.
 
     hessian : (3, n), grad^2 V by x or y: diagonal, i with i + 1, i with i + 2. corner : (2,), 0 with 3 and n - 4 with n - 1.
-    twist : (2, n), by theta: diagonal, i with i + 1.
+    twist : (2, n), grad^2 V by theta: diagonal, i with i + 1.
     """
 
-    bend: NDArray
-    torsion: NDArray
-    hessian: NDArray
-    corner: NDArray
-    twist: NDArray
+    bend: Float
+    torsion: Float
+    hessian: Float
+    corner: Float
+    twist: Float
 
 
 @fill(do.elastic, LinearSprings)
-def _elastic(law: LinearSprings, d: NDArray) -> float:
+def _elastic(law: LinearSprings, d: Float) -> float:
     total = 0.0
     for i in range(law.bend.size):
         x, y = d[0, i + 1] - d[0, i], d[1, i + 1] - d[1, i]
@@ -139,11 +139,11 @@ def _elastic(law: LinearSprings, d: NDArray) -> float:
 
 
 @fill(do.tension, LinearSprings)
-def _tension(law: LinearSprings, ends: int, before: NDArray, d: NDArray, g: NDArray) -> None:
+def _tension(law: LinearSprings, ends: int, before: Float, d: Float, g: Float) -> None:
     n, bend = d.shape[1] - 1, law.bend
     for row in range(2):
         x, to = d[row], g[row]
-        # moments bend (d_{i+1} - d_i) of two discs pull at the link between them
+        # the tension of a link is a difference of the moments bend (d_{i+1} - d_i) of its two discs
         first = bend[0] * (x[1] - x[0])
         to[0] = -first
         for j in range(1, n):
@@ -156,8 +156,8 @@ def _tension(law: LinearSprings, ends: int, before: NDArray, d: NDArray, g: NDAr
 
 
 @part
-def fold(ends: int, to: NDArray) -> None:
-    """What pulls at the ghost links, (n + 1,), put on the links that they are made of; see `discs.kernels.slaved`."""
+def fold(ends: int, to: Float) -> None:
+    """Add the tensions of ghost links in `to`, (n + 1,), to the links that define them; see `discs.kernels.slaved`."""
     n = to.size - 1
     if ends == RING:
         to[n] += to[0]
@@ -174,5 +174,5 @@ def fold(ends: int, to: NDArray) -> None:
 
 
 @fill(do.assemble, LinearSprings)
-def _assemble(law: LinearSprings, ends: int, before: NDArray, d: NDArray, c: NDArray, one: float, g: float, matrix: Matrix) -> None:
+def _assemble(law: LinearSprings, ends: int, before: Float, d: Float, c: Float, one: float, g: float, matrix: Matrix) -> None:
     assemble(law, ends, c, one, g, matrix)

@@ -5,14 +5,14 @@ Strains are the turning of the line at disc i per length, (arg d_i - arg d_{i-1}
 
     arg d_1 - arg d_0 = delta = (delta/sin delta) J M . D/(|d_0||d_1|),   |d_1| - |d_0| = 2 M . D/(|d_0| + |d_1|),
 
-since the cross product of d_0 and d_1 is that of M and D. The ends bear no bend: the natural condition is phi' = 0.
+since d_0 x d_1 = M x D. The ends have no bending spring: the natural condition is phi' = 0.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Complex, Float
 from discs.chains.links.law import LinkLaw
 from discs.chains.rolling_discs import Assembly, folded
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 class Line(NamedTuple):
     """Secant of the true curvature: links before and after a step, (3, n_links), and gradients of their angle and length.
 
-    turn, stretch : (2, n_links), the vectors whose product with the change of a link is the change of its angle, length.
+    turn, stretch : (2, n_links), vectors; their product with the change of a link is the change of its angle and of its length.
     """
 
-    before: NDArray
-    after: NDArray
-    turn: NDArray
-    stretch: NDArray
+    before: Float
+    after: Float
+    turn: Float
+    stretch: Float
 
 
 class TrueCurvature(LinkLaw):
@@ -40,9 +40,9 @@ class TrueCurvature(LinkLaw):
     parameters = None
 
     @staticmethod
-    def density(bending: float, stretching: float, z: NDArray, z1: NDArray) -> NDArray:
+    def density(bending: float, stretching: float, z: Complex, z1: Complex) -> Float:
         turning = (z.conj() * z1).imag / np.abs(z) ** 2 if bending else 0.0
-        density: NDArray = bending * turning**2 + stretching * (np.abs(z) - 1) ** 2
+        density: Float = bending * turning**2 + stretching * (np.abs(z) - 1) ** 2
         return density
 
     def __init__(self, chain: "Chain") -> None:
@@ -58,28 +58,29 @@ class TrueCurvature(LinkLaw):
         bends = np.stack([place[middle - 1], place[middle], place[(middle + 1) % n]], axis=1)
         self._assembly = Assembly(bends, np.stack([place[self._first], place[self._second]], axis=1))
 
-    def _neighbours(self, values: NDArray) -> tuple[NDArray, NDArray]:
+    def _neighbours(self, values: Float) -> tuple[Float, Float]:
         """Values of links (..., n_links) before and after each bend."""
         return (np.roll(values, 1, axis=-1), values) if self._ring else (values[..., :-1], values[..., 1:])
 
-    def _around(self, values: NDArray) -> tuple[NDArray, NDArray]:
+    def _around(self, values: Float) -> tuple[Float, Float]:
         """Values of bends (n_bends,) at the first and the second disc of each link; zero where there is no bend."""
         at_discs = values if self._ring else np.pad(values, 1)
         return at_discs[self._first], at_discs[self._second]
 
-    def _turning(self, d: NDArray) -> NDArray:
-        """Turning per length at the bends, (n_bends,): each less than half a turn."""
+    def _turning(self, d: Float) -> Float:
+        """Curvature at the bends, (n_bends,), from turns of less than 180 degrees."""
         a, b = self._neighbours(d[:2])
-        return np.arctan2(a[0] * b[1] - a[1] * b[0], (a * b).sum(axis=0)) / self._k
+        turned: Float = np.arctan2(a[0] * b[1] - a[1] * b[0], (a * b).sum(axis=0)) / self._k
+        return turned
 
-    def potential(self, d: NDArray) -> float:
+    def potential(self, d: Float) -> float:
         stretch, twist = np.hypot(d[0], d[1]) / self._k - 1, d[2] / self._k
         return 0.5 * float(self._bending @ self._turning(d) ** 2 + self._stretching @ stretch**2 + self._torsion @ twist**2)
 
-    def polarised(self, d: NDArray, other: NDArray) -> float:
+    def polarised(self, d: Float, other: Float) -> float:
         raise ValueError("V is not quadratic with curvature='true'")
 
-    def secant(self, d: NDArray, change: NDArray) -> Line:
+    def secant(self, d: Float, change: Float) -> Line:
         after = d + change
         middle = (d + 0.5 * change)[:2]
         a, b = np.hypot(d[0], d[1]), np.hypot(after[0], after[1])
@@ -88,7 +89,7 @@ class TrueCurvature(LinkLaw):
         # delta/sin(delta), safe at zero; a link that turns by half a turn in one step has no mean direction
         return Line(d, after, across / (np.sinc(delta / np.pi) * a * b), 2 * middle / (a + b))
 
-    def tension(self, secant: Line) -> NDArray:
+    def tension(self, secant: Line) -> Float:
         before, after, turn, stretch = secant
         moment = self._bending * 0.5 * (self._turning(before) + self._turning(after))
         length = 0.5 * (np.hypot(before[0], before[1]) + np.hypot(after[0], after[1]))
@@ -98,7 +99,7 @@ class TrueCurvature(LinkLaw):
         tension[2] = self._torsion * 0.5 * (before[2] + after[2]) / self._k**2
         return tension
 
-    def stiffness(self, secant: Line, c: NDArray) -> NDArray:
+    def stiffness(self, secant: Line, c: Float) -> Float:
         """Bends join a disc with its two neighbours, links join two discs."""
         k, sides = self._k, (self._first, self._second)
         turn = [(secant.turn * c[:2, disc]).sum(axis=0) / k for disc in sides]

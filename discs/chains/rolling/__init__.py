@@ -1,4 +1,4 @@
-"""Laws of rolling, one file each: how far a disc with a slaved heading travels as it rolls. `law` says what each must give."""
+"""Laws of rolling, one file each: the travel of a disc with slaved heading per angle of roll. `law` defines the interface."""
 
 from discs.chains.rolling.field import FieldLaw
 from discs.chains.rolling.law import RollingLaw, stretching

@@ -1,38 +1,37 @@
 """The paper's law (constraints), r. = R omega J r': h(z) = z."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from numpy.typing import NDArray
-
+from discs.arrays import Complex, Float
 from discs.chains.rolling.law import RollingLaw
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill
 
 
 class FieldRolling(NamedTuple):
-    """The compiled form needs no numbers but a kind of its own."""
+    """Parameters of the compiled form, chosen by this type alone. (For numba a NamedTuple must have a field.)"""
 
     stretching: float
 
 
 class FieldLaw(RollingLaw):
-    """A disc's travel for an angle of roll is R times the slope, so that it grows where the line is stretched."""
+    """A disc travels R |r'| per radian of roll: more where the line is stretched."""
 
     name = "field"
     formula = "the paper's law, ṙ = RωJr'"
     vanishing = False
     parameters = FieldRolling(1.0)
 
-    def size(self, length: Any) -> Any:
+    def size(self, length: Float) -> Float:
         return length
 
-    def arm(self, radius: Any, z: Any) -> Any:
+    def arm(self, radius: float | Float, z: Float) -> float | Float:
         return radius
 
-    def rate(self, z: NDArray, dz: NDArray) -> NDArray:
+    def rate(self, z: Float, dz: Float) -> Float:
         return dz
 
-    def jet(self, z: NDArray, z1: NDArray, z2: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def jet(self, z: Complex, z1: Complex, z2: Complex) -> tuple[Complex, Complex, Complex]:
         return z, z1, z2
 
 

@@ -1,9 +1,11 @@
-"""What a law of rolling is; see `discs.chains.rolling`."""
+"""The interface of a law of rolling; see `discs.chains.rolling`."""
 
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from discs.arrays import Complex, Float
+from discs.skew import Parameters
 
 
 class RollingLaw(Protocol):
@@ -15,33 +17,33 @@ class RollingLaw(Protocol):
     ----------
     name : as given to `Chain(rolling=...)` and `Scene(rolling=...)`.
     formula : the law in words, for reports.
-    vanishing : whether h has no limit as z -> 0; runs then stop where a slope vanishes.
-    parameters : for the compiled form, a NamedTuple that stubs of `discs.kernels.protocol` are filled for. None if there is none:
-        runs then take the plain engine.
+    vanishing : whether h has no limit as z -> 0; a run then stops if a slope vanishes.
+    parameters : for the compiled form, a NamedTuple whose type the stubs `contact`, `jet` and `vanishing` of
+        `discs.kernels.protocol` are filled in for. None if there is none: runs then take the plain engine.
     """
 
     name: ClassVar[str]
     formula: ClassVar[str]
     vanishing: ClassVar[bool]
-    parameters: ClassVar[Any]
+    parameters: ClassVar[Parameters]
 
-    def size(self, length: Any) -> Any:
-        """|h| for |z|, of any shape."""
+    def size(self, length: Float) -> Float:
+        """|h| from |z|, of any shape."""
 
-    def arm(self, radius: Any, z: Any) -> Any:
-        """R |h|/|z| (n,) for slopes (2, n): e = arm J z. Length."""
+    def arm(self, radius: float | Float, z: Float) -> float | Float:
+        """R |h|/|z|, (n,), for slopes (2, n): e = arm J z. Length."""
 
-    def rate(self, z: NDArray, dz: NDArray) -> NDArray:
-        """The derivative of h at z along dz, (2, ...) all three."""
+    def rate(self, z: Float, dz: Float) -> Float:
+        """The derivative of h at z along dz; all three (2, ...)."""
 
-    def jet(self, z: NDArray, z1: NDArray, z2: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """h, h', h'' for z, z', z'' of any one shape, a prime for d/ds; vectors as complex numbers x + i y."""
+    def jet(self, z: Complex, z1: Complex, z2: Complex) -> tuple[Complex, Complex, Complex]:
+        """h, h', h'' from z, z', z'' of one shape, a prime for d/ds; vectors are complex numbers x + i y."""
 
 
 def stretching(law: RollingLaw) -> float:
-    """gamma = d|h|/d|z| at |z| = 1: how a disc's travel grows where the line is stretched. 1 for the field law, 0 for the unit law.
+    """gamma = d|h|/d|z| at |z| = 1, the relative growth of travel with stretch: 1 for the field law, 0 for the unit law.
 
-    It alone tells how small waves of the straight rod differ from law to law, see `continuum.dispersion`.
+    Small waves of the straight rod depend on the law by gamma only, see `continuum.dispersion`.
     """
     along = np.array([1.0, 0.0])
     return float(law.rate(along, along)[0])

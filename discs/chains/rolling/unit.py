@@ -1,42 +1,43 @@
 """True rolling of a disc of radius R (constraintsphi), r. = R omega J r'/|r'|: h(z) = z/|z|."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Complex, Float
 from discs.chains.rolling.law import RollingLaw
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill
 
 
 class UnitRolling(NamedTuple):
-    """The compiled form needs no numbers but a kind of its own."""
+    """Parameters of the compiled form, chosen by this type alone. (For numba a NamedTuple must have a field.)"""
 
     stretching: float
 
 
 class UnitLaw(RollingLaw):
-    """A disc travels R for each radian of roll, whatever the line's stretch."""
+    """A disc travels R per radian of roll, independent of the stretch of the line."""
 
     name = "unit"
     formula = "true rolling, ṙ = RωJr'/|r'|"
     vanishing = True
     parameters = UnitRolling(0.0)
 
-    def size(self, length: Any) -> Any:
+    def size(self, length: Float) -> Float:
         return np.ones_like(length)
 
-    def arm(self, radius: Any, z: Any) -> Any:
-        return radius / np.hypot(*z)
+    def arm(self, radius: float | Float, z: Float) -> float | Float:
+        arm: Float = radius / np.hypot(*z)
+        return arm
 
-    def rate(self, z: NDArray, dz: NDArray) -> NDArray:
-        """The part of dz across z, over |z|."""
+    def rate(self, z: Float, dz: Float) -> Float:
+        """The component of dz perpendicular to z, over |z|."""
         square = (z * z).sum(axis=0)
-        across: NDArray = (dz - z * ((z * dz).sum(axis=0) / square)) / np.sqrt(square)
+        across: Float = (dz - z * ((z * dz).sum(axis=0) / square)) / np.sqrt(square)
         return across
 
-    def jet(self, z: NDArray, z1: NDArray, z2: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def jet(self, z: Complex, z1: Complex, z2: Complex) -> tuple[Complex, Complex, Complex]:
         """h = exp(i phi) with phi' = Im(z'/z): h' = i phi' h and h'' = (i phi'' - phi'^2) h."""
         h, log = z / np.abs(z), z1 / z
         rate, turning = 1j * log.imag, 1j * (z2 / z - log * log).imag
