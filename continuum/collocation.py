@@ -1,4 +1,4 @@
-"""One Gauss step of a rod on n functions in NumPy; the compiled twin is `continuum.kernels.collocation`.
+"""What guides the Gauss steps of a rod on n functions, and its motion within them; the compiled twin is `continuum.kernels`.
 
 The stages are those of `discs.integrators.gauss`, and so is a sweep. Three things differ, as steps are long here and matrices full.
 The common C is that of an earlier step, and its matrix is kept by its eigenvectors, which serve all lengths of steps. A step ends
@@ -14,6 +14,7 @@ the stages at c_j, and Lagrange's polynomials l_j through all c, L_j through 0 a
 which at tau = 1 are the step's end.
 """
 
+import signal
 from functools import cache
 
 import numpy as np
@@ -21,45 +22,60 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from continuum.galerkin import Modes, SpectralRod
-from discs.integrators.collocation import tableau
+from discs.integrators.collocation import Collocation, tableau
+from discs.integrators.gauss import Guide, collocate
 from discs.skew import Phase, add
 
 
+class Frozen(Guide):
+    """The modes of a configuration not far away; sweeps are mixed."""
+
+    def __init__(self, rod: SpectralRod, z: Phase, modes: Modes, h: float, tolerance: float) -> None:
+        self._rod, self._modes, self._h, self._tolerance = rod, modes, h, tolerance
+        self._start = rod.basis(z.hi + z.lo)
+        self._results: list[tuple[NDArray, NDArray, NDArray]] = []
+
+    def rates(self, p: NDArray) -> NDArray:
+        return self._rod.forward(self._start, p)
+
+    def solve(self, value: complex, rest: NDArray) -> NDArray:
+        return self._modes.vectors @ ((self._modes.back @ rest) / (1 + self._h**2 * value**2 * self._modes.values))
+
+    def moved(self, change: NDArray, before: NDArray, v: NDArray, p: NDArray) -> tuple[float, NDArray, NDArray]:
+        moved = v - before
+        far = float((np.abs(0.5 * self._h * moved) / self._rod.scale[:, None]).max())
+        if far <= self._tolerance or not np.isfinite(far):
+            return far, v, p
+        self._results = [(v, p, moved), *self._results[:2]]
+        factors = mixing([change for _, _, change in self._results])
+        v, p = (sum(x * result[i] for x, result in zip(factors, self._results, strict=True)) for i in (0, 1))
+        return far, v, p
+
+
 def step(
-    rod: SpectralRod, z: Phase, modes: Modes, h: float, stages: int, sweeps: int, tolerance: float
+    rod: SpectralRod, z: Phase, modes: Modes, t: float, h: float, stages: int, sweeps: int, tolerance: float, compiled: bool = True
 ) -> tuple[Phase, NDArray, NDArray, int]:
-    """The state a time h after z, the rates (stages, 3, n) and momenta (stages, n) of the stages, and the number of sweeps.
+    """The state a time h after z at t, the rates (stages, 3, n) and momenta (stages, n) of the stages, and the number of sweeps.
 
     Parameters
     ----------
     modes : of a configuration not far away.
     stages : even.
-    tolerance : of the positions' last change, in units of `rod.scale`; where so many `sweeps` do not reach it, z and 0 are
-        returned.
+    tolerance : of the positions' last change, in units of `rod.scale`; where so many `sweeps` do not reach it, 0 is returned, and
+        the rest is undefined.
     """
     rule = tableau(stages)
-    a, pairs = rule.a, (rule.pairs, rule.pairs_in, rule.pairs_out)
-    base = z.hi + z.lo
-    p = np.array([z.pi] * stages)
-    v = rod.forward(rod.basis(base), p)
-    results: list[tuple[NDArray, NDArray, NDArray]] = []
-    for sweep in range(1, sweeps + 1):
-        c = rod.basis(base + h * np.tensordot(a, v, 1))
-        force = rod.back(c, rod.mean_force(base + h * np.tensordot(a, rod.forward(c, p), 1)))
-        rest = z.pi - p - h * np.tensordot(a, force, 1)
-        for value, into, out in zip(*pairs, strict=True):
-            part = modes.vectors @ ((modes.back @ (into @ rest)) / (1 + h * h * value**2 * modes.values))
-            p = p + np.multiply.outer(out, part).real
-        moved = rod.forward(c, p) - v
-        v = v + moved
-        if (np.abs(0.5 * h * moved) <= tolerance * rod.scale[:, None]).all():
-            return Phase(*add(z.hi, z.lo, h * np.tensordot(rule.b, v, 1)), z.pi + rule.last @ (p - z.pi)), v, p, sweep
-        if not np.isfinite(moved).all():
-            break
-        results = [(v, p, moved), *results[:2]]
-        factors = mixing([change for _, _, change in results])
-        v, p = (sum(x * result[i] for x, result in zip(factors, results, strict=True)) for i in (0, 1))
-    return z, v, p, 0
+    if not compiled:
+        after, v, p, taken = collocate(rod, z, t, h, rule, Frozen(rod, z, modes, h, tolerance), sweeps, tolerance)
+        return after, v, p, taken if taken < sweeps else 0
+    from continuum.kernels.collocation import step
+
+    before = Phase(z.hi, z.lo, z.pi[None])
+    after, v, p = Phase(*map(np.empty_like, before)), np.empty((stages, 3, rod.n)), np.empty((stages, 1, rod.n))
+    method, chain = Collocation(rule, sweeps, tolerance), rod.parameters._replace(modes=modes)
+    while (cost := step(method, chain, before, after, t, h, v, p))[0] < 0:
+        signal.raise_signal(signal.SIGINT)
+    return after._replace(pi=after.pi[0]), v, p[:, 0], 0 if cost[2] else cost[0] // stages
 
 
 def within(z: Phase, h: float, v: NDArray, p: NDArray, parts: NDArray) -> Phase:

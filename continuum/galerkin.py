@@ -97,7 +97,7 @@ class SpectralRod(SkewGradient):
 
     @cached_property
     def parameters(self) -> Any:
-        """The parameters for the compiled form of steps."""
+        """The parameters for the compiled form of steps, which are still to be given modes."""
         from continuum.kernels.spectral import Spectral
 
         return Spectral(
@@ -115,6 +115,7 @@ class SpectralRod(SkewGradient):
             shift=self._shift,
             radius=float(self._radius),
             rolling=self.law.parameters,
+            modes=None,
         )
 
     @cached_property

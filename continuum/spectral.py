@@ -191,7 +191,8 @@ class Search:
                             tolerance, finest = shorter.tolerance, finer(shorter.tolerance, stages)
             except SimulationError as error:
                 if failure and abs(error.time - failure.time) <= SAME * failure.time:
-                    raise failure if isinstance(error, TooFast) else error from None
+                    # the earlier one: rounding, which grows where r' vanishes, may carry the other beyond the end
+                    raise min(failure, error, key=lambda e: (isinstance(e, TooFast), e.time)) from None
                 failure, last, self._change = error, None, np.inf
                 continue
             last, tolerance = found, max(finer(tolerance, stages), finest)

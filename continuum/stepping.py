@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from continuum import collocation
 from continuum.galerkin import Modes, SpectralRod
 from discs import SimulationError
-from discs.integrators.collocation import tableau
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Phase
 
@@ -107,14 +106,14 @@ class Steps:
                     yield collocation.within(start, t - before, v, p, (some - before) / (t - before))
             times = times[inside.size :]
 
-    def _step(self, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
+    def _step(self, t: float, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
         """As `collocation.step`: with the modes of an earlier step as long as they save more than they cost."""
         fresh = self._modes is None or self._excess > MODES * self.rod.n / self._stages
         while True:
             if fresh:
                 c = self.rod.basis(z.hi + z.lo)
                 self._modes = self.rod.modes(self.rod.basis(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi)))
-            after, v, p, taken = self._sweep(z, h)
+            after, v, p, taken = self._sweep(t, z, h)
             if fresh:
                 self._usual, self._excess = taken, 0
             else:
@@ -123,16 +122,9 @@ class Steps:
                 return after, v, p, taken
             fresh = True
 
-    def _sweep(self, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
+    def _sweep(self, t: float, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
         assert self._modes is not None
-        if not self._compiled:
-            return collocation.step(self.rod, z, self._modes, h, self._stages, SWEEPS, self._sweeps)
-        from continuum.kernels.collocation import step
-
-        after = Phase(z.hi.copy(), z.lo.copy(), z.pi.copy())
-        v, p = np.empty((self._stages, 3, self.rod.n)), np.empty((self._stages, self.rod.n))
-        taken = step(self.rod.parameters, *after, self._modes, tableau(self._stages), h, SWEEPS, self._sweeps, v, p)
-        return after, v, p, taken
+        return collocation.step(self.rod, z, self._modes, t, h, self._stages, SWEEPS, self._sweeps, self._compiled)
 
     def _advance(self, t: float, z: Phase) -> tuple[float, Phase, NDArray, NDArray]:
         """One step from z at t that converges and is within the tolerance, and the rates and momenta of its stages."""
@@ -143,7 +135,7 @@ class Steps:
             self._check_number(t)
             if h < SHORTEST * min(self._duration, self.rod.crossing):
                 raise self._too_fast(t)
-            after, v, p, taken = self._step(z, h)
+            after, v, p, taken = self._step(t, z, h)
             if not taken or self._turned(slopes, after):
                 self._check_heading(slopes, t)
                 self._next = h / 2

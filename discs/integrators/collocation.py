@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted, part
 from discs.kernels.shared import add as advance
-from discs.kernels.shared import column, copy, forward, largest, renew
+from discs.kernels.shared import column, copy, forward, largest, renew, stuck, unsettled
 from discs.skew import Phase
 
 
@@ -61,17 +61,26 @@ class Collocation(NamedTuple):
 
 
 class Room(NamedTuple):
-    """c and move like positions; stages and v (s, rows, n); p, force and rest (s, columns, n); x, z like momenta, z complex; change
-    (n,). stiff, single, double : matrices of the chain; the last two have one for each real eigenvalue and each pair."""
+    """times (s,); moves and v (s, rows, n); p, rest and force, also the change of p, (s, columns, n); stages of the chain."""
 
-    c: NDArray
-    still: NDArray
-    move: NDArray
-    stages: NDArray
+    times: NDArray
+    moves: NDArray
     v: NDArray
     p: NDArray
     force: NDArray
     rest: NDArray
+    stages: Any
+
+
+class Stages(NamedTuple):
+    """c of the stages of discs (s, rows, n), and what guides their sweeps: `common` C (rows, n), that in the middle of the step.
+
+    x, z like momenta, z complex; change (n,). stiff, single, double : matrices of the chain; the last two have one for each real
+    eigenvalue and each pair.
+    """
+
+    c: NDArray
+    common: NDArray
     x: NDArray
     z: NDArray
     change: NDArray
@@ -128,81 +137,98 @@ def reach(c: NDArray, p: NDArray, tau: float, scale: NDArray, change: NDArray) -
     return furthest
 
 
-@fill(do.room, Collocation, _nrt=True)
-def _room(method: Collocation, chain: Any, state: Phase) -> Room:
-    (rows, n), columns, s = state.hi.shape, state.pi.shape[0], method.tableau.b.size
-    c, still, move = np.empty((rows, n)), np.zeros((rows, n)), np.empty((rows, n))
-    stages, v = np.empty((s, rows, n)), np.empty((s, rows, n))
-    p, force, rest = np.empty((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n))
-    x, z, change = np.empty((columns, n)), np.empty((columns, n), np.complex128), np.empty(n)
-    stiff, single = do.factors(chain, 1.0, 1), do.factors(chain, 1.0, method.tableau.real.size)
-    return Room(
-        c, still, move, stages, v, p, force, rest, x, z, change, stiff, single, do.factors(chain, 1.0j, method.tableau.pairs.size)
-    )
+@fill(do.stages, object, _nrt=True)
+def _stages(chain: Any, method: Collocation, rows: int, columns: int) -> Stages:
+    rule, n = method.tableau, chain.weights.shape[1]
+    c, common, x = np.empty((rule.b.size, rows, n)), np.empty((rows, n)), np.empty((columns, n))
+    z, change, stiff = np.empty((columns, n), np.complex128), np.empty(n), do.factors(chain, 1.0, 1)
+    single, double = do.factors(chain, 1.0, rule.real.size), do.factors(chain, 1.0j, rule.pairs.size)
+    return Stages(c, common, x, z, change, stiff, single, double)
 
 
-@fill(do.step, Collocation, forceinline=True)
-def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
-    c, move, p, force, rest, x, z, stages, v = (
-        room.c,
-        room.move,
-        room.p,
-        room.force,
-        room.rest,
-        room.x,
-        room.z,
-        room.stages,
-        room.v,
-    )
-    rule = method.tableau
-    a, pi, s, stiff = rule.a, before.pi, rule.b.size, do.pick(chain, room.stiff, 0)
-    do.basis(chain, work, room.still, c)
-    renew(c, pi, 0.5 * h, move, chain.scale, room.change)
+@fill(do.begin, object, forceinline=True)
+def _begin(chain: Any, work: Any, method: Collocation, room: Room, before: Phase, h: float) -> None:
+    rule, own, move = method.tableau, room.stages, room.moves[0]
+    c, stiff = own.common, do.pick(chain, own.stiff, 0)
+    move[:] = 0.0
+    do.basis(chain, work, move, c)
+    renew(c, before.pi, 0.5 * h, move, chain.scale, own.change)
     do.basis(chain, work, move, c)
     do.stiffness(chain, work, move, c, stiff)
     for j in range(rule.real.size):
-        do.precondition(chain, stiff, c, h * rule.real[j], h * h * rule.real[j] ** 2, do.pick(chain, room.single, j))
+        do.precondition(chain, stiff, c, h * rule.real[j], h * h * rule.real[j] ** 2, do.pick(chain, own.single, j))
     for j in range(rule.pairs.size):
-        do.precondition(chain, stiff, c, h * rule.pairs[j], h * h * rule.pairs[j] ** 2, do.pick(chain, room.double, j))
+        do.precondition(chain, stiff, c, h * rule.pairs[j], h * h * rule.pairs[j] ** 2, do.pick(chain, own.double, j))
+    for i in range(rule.b.size):
+        forward(c, before.pi, room.v[i])
+
+
+@fill(do.solve, object, forceinline=True)
+def _solve(chain: Any, method: Collocation, room: Room, h: float) -> None:
+    rule, own, x, z = method.tableau, room.stages, room.stages.x, room.stages.z
+    room.force[:] = 0.0
+    for j in range(rule.real.size):
+        transform(rule.real_in[j], room.rest, x)
+        do.correct(chain, do.pick(chain, own.single, j), x)
+        spread(rule.real_out[j], x, room.force)
+    for j in range(rule.pairs.size):
+        transform(rule.pairs_in[j], room.rest, z)
+        do.correct(chain, do.pick(chain, own.double, j), z)
+        spread(rule.pairs_out[j], z, room.force)
+
+
+@fill(do.moved, object, forceinline=True)
+def _moved(chain: Any, method: Collocation, room: Room, sweep: int, h: float) -> float:
+    furthest = 0.0
+    for i in range(room.force.shape[0]):
+        furthest = max(furthest, reach(room.stages.common, room.force[i], 0.5 * h, chain.scale, room.stages.change))
+    return furthest
+
+
+@fill(do.room, Collocation, _nrt=True)
+def _room(method: Collocation, chain: Any, state: Phase) -> Room:
+    (rows, n), columns, s = state.hi.shape, state.pi.shape[0], method.tableau.b.size
+    moves, v, p = np.empty((s, rows, n)), np.empty((s, rows, n)), np.empty((s, columns, n))
+    force, rest = np.empty((s, columns, n)), np.empty((s, columns, n))
+    return Room(np.empty(s), moves, v, p, force, rest, do.stages(chain, method, rows, columns))
+
+
+@fill(do.step, Collocation, forceinline=True)
+@part
+def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
+    times, moves, v, p, force, rest, stages = room
+    rule, pi, c = method.tableau, before.pi, stages.c
+    a, s = rule.a, rule.b.size
     for i in range(s):
+        times[i] = t + rule.nodes[i] * h
         copy(pi, p[i])
-        forward(c, p[i], v[i])
+    do.begin(chain, work, method, room, before, h)
     sweep, moved = 0, np.inf
-    while sweep < method.sweeps and not moved <= method.tolerance:
+    while unsettled(method, sweep, moved):
         if interrupted():
             return CUT
-        sweep += 1
         # C where the stages are, velocities by it, and forces where these lead
         for i in range(s):
-            combine(a[i], v, h, move)
-            do.basis(chain, work, move, stages[i])
+            combine(a[i], v, h, moves[i])
+        do.bases(chain, work, moves, c)
+        do.forwards(chain, work, c, p, v)
         for i in range(s):
-            forward(stages[i], p[i], v[i])
-        for i in range(s):
-            combine(a[i], v, h, move)
-            do.pullback(chain, work, before, t + rule.nodes[i] * h, move, stages[i], p[i], force[i])
+            combine(a[i], v, h, moves[i])
+        do.forces(chain, work, before, times, moves, c, p, force)
         for i in range(s):
             combine(a[i], force, -h, rest[i])
             for row in range(pi.shape[0]):
                 for k in range(pi.shape[1]):
                     rest[i, row, k] += pi[row, k] - p[i, row, k]
-        # the change of p, eigenvector by eigenvector
-        force[:] = 0.0
-        for j in range(rule.real.size):
-            transform(rule.real_in[j], rest, x)
-            do.correct(chain, do.pick(chain, room.single, j), x)
-            spread(rule.real_out[j], x, force)
-        for j in range(rule.pairs.size):
-            transform(rule.pairs_in[j], rest, z)
-            do.correct(chain, do.pick(chain, room.double, j), z)
-            spread(rule.pairs_out[j], z, force)
-        moved = 0.0
+        do.solve(chain, method, room, h)
         for i in range(s):
-            moved = max(moved, reach(c, force[i], 0.5 * h, chain.scale, room.change))
             for row in range(pi.shape[0]):
                 for k in range(pi.shape[1]):
                     p[i, row, k] += force[i, row, k]
-            forward(stages[i], p[i], v[i])
+        do.forwards(chain, work, c, p, v)
+        moved = do.moved(chain, method, room, sweep, h)
+        sweep += 1
+    move = moves[0]
     combine(rule.b, v, h, move)
     advance(before, move, 1.0, after)
     for row in range(pi.shape[0]):
@@ -212,7 +238,7 @@ def _step(method: Collocation, chain: Any, work: Any, room: Room, before: Phase,
                 total += rule.last[i] * (p[i, row, k] - start)
             after.pi[row, k] = start + total
     do.settle(chain, work, after.hi, after.lo)
-    return s * sweep, sweep * (rule.real.size + rule.pairs.size), method.tolerance > 0 and sweep == method.sweeps
+    return s * sweep, sweep * (rule.real.size + rule.pairs.size), stuck(method, sweep)
 
 
 @fill(do.jumps, Collocation)

@@ -1,6 +1,6 @@
 """Collocation at Gauss points."""
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -10,8 +10,72 @@ from numpy.typing import NDArray
 
 from discs import checks
 from discs.integrators.base import OneStep, Work
-from discs.integrators.collocation import Collocation, tableau
+from discs.integrators.collocation import Collocation, Tableau, tableau
 from discs.skew import Phase, SkewGradient, add
+
+
+class Guide(ABC):
+    """What guides the sweeps of a step: a first guess, and a C that does not change from sweep to sweep."""
+
+    @abstractmethod
+    def rates(self, p: NDArray) -> NDArray:
+        """A first guess of the rates of the stages, (s, rows, n), for their momenta (s, ...)."""
+
+    @abstractmethod
+    def solve(self, value: complex, rest: NDArray) -> NDArray:
+        """Solve (I + h value C^T D C + (h value)^2 C^T S C) p = rest for p, of the shape of pi."""
+
+    @abstractmethod
+    def moved(self, change: NDArray, before: NDArray, v: NDArray, p: NDArray) -> tuple[float, NDArray, NDArray]:
+        """How far a sweep moved the stages, in units of the system's scale, and rates and momenta to go on with.
+
+        The sweep changed the momenta by `change` to p and the rates from `before` to v.
+        """
+
+
+class Common(Guide):
+    """C in the middle of the step, by the velocity at its start."""
+
+    def __init__(self, system: SkewGradient, z: Phase, h: float) -> None:
+        self._system, self._h = system, h
+        shape = system.shape(z.hi, z.lo)
+        middle = system.moved(shape, 0.5 * h * system.forward(system.basis(shape), z.pi))
+        self._c, self._secant = system.basis(middle), system.secant(middle, np.zeros_like(z.hi))
+
+    def rates(self, p: NDArray) -> NDArray:
+        return np.array([self._system.forward(self._c, stage) for stage in p])
+
+    def solve(self, value: complex, rest: NDArray) -> NDArray:
+        return self._system.solve(self._secant, self._c, self._h * self._h * value**2, rest, self._h * value)
+
+    def moved(self, change: NDArray, before: NDArray, v: NDArray, p: NDArray) -> tuple[float, NDArray, NDArray]:
+        far = np.abs([0.5 * self._h * self._system.forward(self._c, stage) for stage in change]).max(axis=(0, 2))
+        return float((far / self._system.scale).max()), v, p
+
+
+def collocate(
+    system: SkewGradient, z: Phase, t: float, h: float, rule: Tableau, guide: Guide, sweeps: int, tolerance: float
+) -> tuple[Phase, NDArray, NDArray, int]:
+    """The state a time h after z at t, the rates (s, rows, n) and momenta (s, ...) of the stages, and the number of sweeps."""
+    shape = system.shape(z.hi, z.lo)
+    parts = [
+        *zip(rule.real, rule.real_in, rule.real_out, strict=True),
+        *zip(rule.pairs, rule.pairs_in, rule.pairs_out, strict=True),
+    ]
+    p = np.array([z.pi] * rule.b.size)
+    v = guide.rates(p)
+    for sweep in range(1, sweeps + 1):  # noqa: B007, returned
+        c = system.bases(shape, h * _mix(rule.a, v))
+        force = system.pulls(c, shape, t + h * rule.nodes, z, h * _mix(rule.a, system.forwards(c, p)), p)
+        rest = z.pi - p - h * _mix(rule.a, force)
+        change = np.zeros_like(p)
+        for value, into, out in parts:
+            change += np.multiply.outer(out, guide.solve(value, _mix(into, rest))).real
+        p, before = p + change, v
+        moved, v, p = guide.moved(change, before, system.forwards(c, p), p)
+        if moved <= tolerance:
+            break
+    return Phase(*add(z.hi, z.lo, h * _mix(rule.b, v)), z.pi + _mix(rule.last, p - z.pi)), v, p, sweep
 
 
 @dataclass(frozen=True)
@@ -53,31 +117,12 @@ class Gauss(OneStep, ABC):
         return replace(self, tolerance=tolerance) if self.tolerance else self
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
-        a, b, nodes, last, real, real_in, real_out, pairs, pairs_in, pairs_out = tableau(self.stages)
-        shape = system.shape(z.hi, z.lo)
-        middle = system.moved(shape, 0.5 * h * system.forward(system.basis(shape), z.pi))
-        common = system.basis(middle)
-        secant = system.secant(middle, np.zeros_like(z.hi))
-        parts = [*zip(real, real_in, real_out, strict=True), *zip(pairs, pairs_in, pairs_out, strict=True)]
-        p = np.array([z.pi] * self.stages)
-        v = np.array([system.forward(common, stage) for stage in p])
-        for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
-            c = system.bases(shape, h * _mix(a, v))
-            force = system.pulls(c, shape, t + h * nodes, z, h * _mix(a, system.forwards(c, p)), p)
-            rest = z.pi - p - h * _mix(a, force)
-            change = np.zeros_like(p)
-            for value, into, out in parts:
-                part = system.solve(secant, common, h * h * value**2, _mix(into, rest), h * value)
-                change += np.multiply.outer(out, part).real
-            p = p + change
-            v = system.forwards(c, p)
-            moved = np.abs([0.5 * h * system.forward(common, stage) for stage in change]).max(axis=(0, 2))
-            if (moved <= self.tolerance * system.scale).all():
-                break
+        rule = tableau(self.stages)
+        after, _, _, sweep = collocate(system, z, t, h, rule, Common(system, z, h), self.sweeps, self.tolerance)
         work.gradients += sweep * self.stages
-        work.solves += sweep * len(parts)
+        work.solves += sweep * (rule.real.size + rule.pairs.size)
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
-        return Phase(*add(z.hi, z.lo, h * _mix(b, v)), z.pi + _mix(last, p - z.pi))
+        return after
 
     @cached_property
     def parameters(self) -> "Collocation":

@@ -12,7 +12,7 @@ from discs.integrators.base import OneStep, Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted
 from discs.kernels.shared import add as advance
-from discs.kernels.shared import copy, renew
+from discs.kernels.shared import copy, renew, stuck, unsettled
 from discs.skew import Phase, SkewGradient, add
 
 WHOLE = np.ones(1)  # the fractions of h of a single midpoint step
@@ -125,14 +125,14 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
         copy(now.pi, p)
         renew(work.c, p, 0.5 * tau, move, chain.scale, room.change)
         sweep, change = 0, np.inf
-        while sweep < method.sweeps and not change <= method.tolerance:
+        while unsettled(method, sweep, change):
             if interrupted():
                 return CUT
             change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
             sweep += 1
         time += tau
         solves += sweep
-        unconverged += method.tolerance > 0 and sweep == method.sweeps
+        unconverged += stuck(method, sweep)
         advance(now, move, 2.0, after)
         for row in range(p.shape[0]):
             mean, start, end = p[row], now.pi[row], after.pi[row]

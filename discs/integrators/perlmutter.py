@@ -13,7 +13,7 @@ from discs.integrators.base import OneStep, Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted
 from discs.kernels.shared import add as advance
-from discs.kernels.shared import back, forward, largest
+from discs.kernels.shared import back, forward, largest, stuck, unsettled
 from discs.skew import Phase, add
 
 
@@ -138,7 +138,7 @@ def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after
             to[k] = w[k] * rate[k] - h * to[k]
     back(c, g, pull)
     sweep, moved = 0, np.inf
-    while sweep < method.sweeps and not moved <= method.tolerance:
+    while unsettled(method, sweep, moved):
         if interrupted():
             return CUT
         sweep += 1
@@ -164,7 +164,7 @@ def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after
             moved = max(moved, largest(change) / chain.scale[row])
     advance(before, move, 1.0, after)
     do.settle(chain, work, after.hi, after.lo)
-    return 1, 0, method.tolerance > 0 and sweep == method.sweeps
+    return 1, 0, stuck(method, sweep)
 
 
 @fill(do.jumps, Swept)

@@ -83,7 +83,7 @@ def stub(function: Callable[..., Any]) -> Any:
 
 
 def fill(of: Any, kind: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Give a stub its form for one kind of parameters, a NamedTuple."""
+    """Give a stub its form for one kind of parameters, a NamedTuple; with `object`, for all kinds that have none of their own."""
 
     def register(function: Callable[..., Any]) -> Callable[..., Any]:
         _MODULES[function.__module__] = function.__globals__
@@ -93,7 +93,8 @@ def fill(of: Any, kind: type, **options: Any) -> Callable[[Callable[..., Any]], 
             from numba.extending import overload
 
             def choose(first: Any, *rest: Any) -> Any:
-                return function if getattr(first, "instance_class", None) is kind else None
+                given = getattr(first, "instance_class", None)
+                return function if (given if given in of.registry else object) is kind else None
 
             choose.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba asks for the same one
             overload(of, jit_options=PART | options)(choose)

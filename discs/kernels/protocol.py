@@ -81,6 +81,48 @@ def lost(chain, work, slope):
     holds the slopes of the base."""
 
 
+# Several configurations at once, the stages of a step: `moves` and `v` (stages, rows, n), `p` and `g` (stages, columns, n). Discs
+# take one after the other, `discs.kernels.shared`; the functions of a field all at once, `continuum.kernels.spectral`.
+
+
+@stub
+def bases(chain, work, moves, c):
+    """c = C after each of `moves` from the base."""
+
+
+@stub
+def forwards(chain, work, c, p, v):
+    """v = C p of each."""
+
+
+@stub
+def forces(chain, work, state, t, moves, c, p, g):
+    """g = C^T (grad V - f) after each of `moves`, as `pullback` has it; t (stages,)."""
+
+
+# What collocation asks of a chain; `room` is its `Room`, `method` its parameters: `discs.integrators.collocation`
+
+
+@stub
+def stages(chain, method, rows, columns):
+    """Room for c of the stages, as `bases` fills it, and for what `begin`, `solve` and `moved` share."""
+
+
+@stub
+def begin(chain, work, method, room, before, h):
+    """v = a first guess of the stages' rates, their momenta being those of `before`; prepares the matrices of `solve`."""
+
+
+@stub
+def solve(chain, method, room, h):
+    """change = the solution for `rest` of the stages' momenta, with a C that does not change from sweep to sweep."""
+
+
+@stub
+def moved(chain, method, room, sweep, h):
+    """How far a sweep, `sweep` after the first, moved the stages, in units of the chain's scale; p and v may be bettered."""
+
+
 # What the driver asks of a method
 
 

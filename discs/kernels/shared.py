@@ -75,6 +75,18 @@ def renew(c, p, tau, move, scale, change):
 
 
 @part
+def unsettled(method, sweep, moved):
+    """Whether a step takes another sweep after so many, the last of which moved it by `moved`, in units of its scale."""
+    return sweep < method.sweeps and not moved <= method.tolerance
+
+
+@part
+def stuck(method, sweep):
+    """Whether a step ended on its limit of sweeps and did not want to."""
+    return method.tolerance > 0 and sweep == method.sweeps
+
+
+@part
 def add(state, increment, factor, to):
     """Positions of `to` = those of `state` + factor * increment, without losing low digits (Knuth's two-sum)."""
     for row in range(increment.shape[0]):
@@ -153,3 +165,21 @@ def ahead(chain, work, state, h, c, half, slope):
     do.settle(chain, work, state.hi, state.lo)
     do.lost(chain, work, slope)
     return lost
+
+
+@fill(do.bases, object, forceinline=True)
+def _bases(chain, work, moves, c):
+    for i in range(moves.shape[0]):
+        do.basis(chain, work, moves[i], c[i])
+
+
+@fill(do.forwards, object, forceinline=True)
+def _forwards(chain, work, c, p, v):
+    for i in range(p.shape[0]):
+        forward(c[i], p[i], v[i])
+
+
+@fill(do.forces, object, forceinline=True)
+def _forces(chain, work, state, t, moves, c, p, g):
+    for i in range(p.shape[0]):
+        do.pullback(chain, work, state, t[i], moves[i], c[i], p[i], g[i])

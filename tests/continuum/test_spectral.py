@@ -10,13 +10,10 @@ from continuum import Rod, Scene, breathing_ring, collocation, exact, rolling_ro
 from continuum.density import Density
 from continuum.functions import polynomials, waves
 from continuum.galerkin import SpectralRod
-from continuum.kernels.collocation import step as compiled_step
 from continuum.scenes import PAPER
 from continuum.spectral import bent_hint
 from discs import Gauss6, SimulationError
 from discs.integrators.base import Work
-from discs.integrators.collocation import tableau
-from discs.skew import Phase
 
 pytestmark = pytest.mark.slow
 
@@ -65,12 +62,11 @@ def test_functions(make, centres, n):
 def followed(scene, n, steps):
     """The rod on n functions, and its state at the end, by equal compiled steps of four stages with modes of their own."""
     rod = SpectralRod(scene, n)
-    z = Phase(*(part.copy() for part in rod.start))
+    z = rod.start
     for _ in range(steps):
         modes = rod.modes(rod.basis(z.hi + z.lo))
-        assert compiled_step(
-            rod.parameters, *z, modes, tableau(4), scene.duration / steps, 50, 1e-12, np.empty((4, 3, n)), np.empty((4, n))
-        )
+        z, _, _, sweeps = collocation.step(rod, z, modes, 0.0, scene.duration / steps, 4, 50, 1e-12)
+        assert sweeps
     return rod, z
 
 
@@ -118,12 +114,12 @@ def test_twins_agree(name, scene):
     rod = SpectralRod(scene, 21)
     modes = rod.modes(rod.basis(rod.start.hi))
     for stages in (4, 6):
-        z = Phase(*(part.copy() for part in rod.start))
-        plain, v, p = rod.start, np.empty((stages, 3, 21)), np.empty((stages, 21))
+        z = plain = rod.start
+        h = scene.duration / 5
         for _ in range(2):
-            sweeps = compiled_step(rod.parameters, *z, modes, tableau(stages), scene.duration / 5, 40, 1e-12, v, p)
             begun = plain
-            plain, rates, momenta, count = collocation.step(rod, plain, modes, scene.duration / 5, stages, 40, 1e-12)
+            z, v, p, sweeps = collocation.step(rod, z, modes, 0.0, h, stages, 40, 1e-12)
+            plain, rates, momenta, count = collocation.step(rod, plain, modes, 0.0, h, stages, 40, 1e-12, compiled=False)
             assert count == sweeps > 1
             np.testing.assert_allclose(v, rates, atol=1e-9)
             np.testing.assert_allclose(p, momenta, atol=1e-12)

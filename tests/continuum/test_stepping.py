@@ -30,7 +30,7 @@ def test_a_motion_errs_by_about_the_tolerance_of_its_steps(rolling, tolerance):
 def test_frames_do_not_change_the_motion(monkeypatch):
     """Nor cost steps: those within one are states of its polynomials. Energy is exact at ends of steps."""
     taken = []
-    monkeypatch.setattr(Steps, "_sweep", lambda self, z, h, sweep=Steps._sweep: taken.append(h) or sweep(self, z, h))
+    monkeypatch.setattr(Steps, "_sweep", lambda self, t, z, h, sweep=Steps._sweep: taken.append(h) or sweep(self, t, z, h))
     monkeypatch.setattr(stepping, "TOGETHER", 3)
     rod = SpectralRod(untwisting_rod(), 27)
     few, many = (Steps(rod, 4.5, 1e-4, 4, 0.3) for _ in range(2))
@@ -143,7 +143,7 @@ def test_headings_are_lost_at_the_discs_threshold():
 def test_a_motion_that_is_too_long_is_named_soon(rolling, duration, monkeypatch):
     """From the length of the first steps, not after all that are allowed; the first one may have to be far shorter than it."""
     taken = []
-    monkeypatch.setattr(Steps, "_sweep", lambda self, z, h, sweep=Steps._sweep: taken.append(h) or sweep(self, z, h))
+    monkeypatch.setattr(Steps, "_sweep", lambda self, t, z, h, sweep=Steps._sweep: taken.append(h) or sweep(self, t, z, h))
     with pytest.raises(ValueError, match=r"would be needed; the motion is too long for this tol.*shorter duration, well below \d"):
         solve(untwisting_rod(rolling, duration=duration), 1e-3, frames=2, progress=False)
     assert len(taken) < 400
