@@ -137,7 +137,7 @@ class Runs(Trust):
             if r.outcome == "ABOVE":
                 lines.append(f"* above: {about}: error {r.error:.1e}, estimate {r.estimate:.1e}")
             elif r.outcome in ("refused", "cut off", "no reference"):
-                lines.append(f"* {r.outcome}: {about}: {shorten(r.says, 200)} [{r.shown}]")
+                lines.append(f"* {r.outcome}: {about}: {shorten(r.says, 200, placeholder=' ...')} ({r.shown})")
             elif r.counts and r.ratio > MOST:
                 lines.append(f"* cautious: {about}: estimate over error {r.ratio:.0f}")
         lines += [f"* broken: {r.case}: {r.error}" for r in self.failed]

@@ -113,7 +113,7 @@ class Trust:
             if r.unlike > LEAST:
                 lines.append(f"* unlike the chains: {r.scene} ({r.kind}, {r.law}), by {r.unlike:.0f} times what they err")
             if r.outcome == "refused":
-                lines.append(f"* refused: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}: {r.says} [{r.shown}]")
+                lines.append(f"* refused: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}: {r.says} ({r.shown})")
         lines += [f"* broken: {r.case}: {r.error}" for r in self.failed]
         return "\n".join(lines)
 
