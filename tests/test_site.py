@@ -50,7 +50,7 @@ def test_reference_tells_parameters_shapes_and_errors(site):
     page = (site / "reference" / "discs.simulation.html").read_text(encoding="utf-8")
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", page))
     assert "Parameters:" in text
-    assert "show a progress bar after one second" in text
+    assert "show a progress bar for runs of more than a second" in text
     assert "for an unknown method or quantity" in text
     page = (site / "reference" / "discs.solution.html").read_text(encoding="utf-8")
     assert "(F, N), contact points, length." in re.sub(r"<[^>]+>", "", page)
