@@ -4,8 +4,8 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from discs.arrays import Complex, Float
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted, part
 from discs.kernels.shared import add as advance
@@ -16,24 +16,24 @@ from discs.skew import Phase
 class Tableau(NamedTuple):
     """Coefficients of an s-stage Gauss method.
 
-    a : (s, s). b, nodes : (s,), weights, and places in [0, 1].
-    last : (s,), b^T a^{-1}, which takes the stages' momenta to those at the end of the step.
+    a : (s, s). b, nodes : (s,), weights, and places in [0, 1]. last : (s,), b^T a^{-1}, from the momenta of stages to those at the
+    end of the step.
 
-    a is diagonalised: `real` holds its real eigenvalues (none or one) and `pairs` the complex ones with a positive imaginary
-    part; in : (number, s), rows that take stages to the eigenvector's part, and out : (number, s), what it is in the stages,
-    twice that for pairs, whose conjugates are left out.
+    a is diagonalised. real : its real eigenvalues (none or one). pairs : the complex ones with positive imaginary part, each for a
+    pair. real_in, pairs_in : (number, s), rows that project stages on the eigenvectors. real_out, pairs_out : (number, s), the
+    eigenvectors; those of pairs are doubled, in place of the conjugate ones.
     """
 
-    a: NDArray
-    b: NDArray
-    nodes: NDArray
-    last: NDArray
-    real: NDArray
-    real_in: NDArray
-    real_out: NDArray
-    pairs: NDArray
-    pairs_in: NDArray
-    pairs_out: NDArray
+    a: Float
+    b: Float
+    nodes: Float
+    last: Float
+    real: Float
+    real_in: Float
+    real_out: Float
+    pairs: Complex
+    pairs_in: Complex
+    pairs_out: Complex
 
 
 @cache
@@ -46,14 +46,14 @@ def tableau(stages: int) -> Tableau:
     values, out = np.linalg.eig(a)
     into = np.linalg.inv(out)
     real, upper = np.abs(values.imag) < 1e-12, values.imag > 1e-12
-    last = np.linalg.solve(a.T, b)
+    last = np.linalg.solve(a.T, b).astype(float, copy=False)
     of_real = values[real].real, into[real].real, out.T[real].real
     of_pairs = values[upper].astype(complex), into[upper].astype(complex), 2 * out.T[upper].astype(complex)
     return Tableau(a, b, c, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
 
 
 class Collocation(NamedTuple):
-    """The method, and the limits of its sweeps."""
+    """Parameters of the compiled form: the coefficients, and the limits of sweeps."""
 
     tableau: Tableau
     sweeps: int
@@ -61,36 +61,37 @@ class Collocation(NamedTuple):
 
 
 class Room(NamedTuple):
-    """times (s,); moves and v (s, rows, n); p, rest and force, also the change of p, (s, columns, n); stages of the chain."""
+    """Workspace. times : (s,). moves, v : (s, rows, n). p, rest, force (later the change of p) : (s, columns, n).
+    stages : `do.stages` of the chain."""
 
-    times: NDArray
-    moves: NDArray
-    v: NDArray
-    p: NDArray
-    force: NDArray
-    rest: NDArray
+    times: Float
+    moves: Float
+    v: Float
+    p: Float
+    force: Float
+    rest: Float
     stages: Any
 
 
 class Stages(NamedTuple):
-    """c of the stages of discs (s, rows, n), and what guides their sweeps: `common` C (rows, n), that in the middle of the step.
+    """Workspace for the stages of discs. c : (s, rows, n), C of each stage. common : (rows, n), C in the middle of the step.
 
-    x, z like momenta, z complex; change (n,). stiff, single, double : matrices of the chain; the last two have one for each real
-    eigenvalue and each pair.
+    x, z : like momenta, z complex. change : (n,). stiff, single, double : matrices of the chain, single and double one for each
+    real eigenvalue and each pair.
     """
 
-    c: NDArray
-    common: NDArray
-    x: NDArray
-    z: NDArray
-    change: NDArray
+    c: Float
+    common: Float
+    x: Float
+    z: Complex
+    change: Float
     stiff: Any
     single: Any
     double: Any
 
 
 @part
-def combine(weights: NDArray, parts: NDArray, h: float, total: NDArray) -> None:
+def combine(weights: Float, parts: Float, h: float, total: Float) -> None:
     """total = h sum_j weights[j] parts[j], (rows, n)."""
     for row in range(total.shape[0]):
         to = total[row]
@@ -104,7 +105,7 @@ def combine(weights: NDArray, parts: NDArray, h: float, total: NDArray) -> None:
 
 
 @part
-def transform(weights: NDArray, parts: NDArray, out: NDArray) -> None:
+def transform(weights: Float, parts: Float, out: Float) -> None:
     """out = sum_j weights[j] parts[j], real or complex, (columns, n)."""
     for row in range(out.shape[0]):
         for i in range(out.shape[1]):
@@ -115,9 +116,8 @@ def transform(weights: NDArray, parts: NDArray, out: NDArray) -> None:
 
 
 @part
-def spread(weights: NDArray, z: NDArray, parts: NDArray) -> None:
-    """parts[j] += weights[j] z for real ones; twice the real part of it for complex ones, which stand for themselves and their
-    conjugates."""
+def spread(weights: Float, z: Float, parts: Float) -> None:
+    """parts[j] += Re(weights[j] z)."""
     for j in range(weights.size):
         for row in range(z.shape[0]):
             to, x = parts[j, row], z[row]
@@ -126,7 +126,7 @@ def spread(weights: NDArray, z: NDArray, parts: NDArray) -> None:
 
 
 @part
-def reach(c: NDArray, p: NDArray, tau: float, scale: NDArray, change: NDArray) -> float:
+def reach(c: Float, p: Float, tau: float, scale: Float, change: Float) -> float:
     """The largest entry of tau C p, each row in units of its `scale`."""
     furthest = 0.0
     for row in range(c.shape[0]):
@@ -207,7 +207,7 @@ def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Ph
     while unsettled(method, sweep, moved):
         if interrupted():
             return CUT
-        # C where the stages are, velocities by it, and forces where these lead
+        # C at the stages, velocities with it, and forces at the stages that these give
         for i in range(s):
             combine(a[i], v, h, moves[i])
         do.bases(chain, work, moves, c)

@@ -1,4 +1,4 @@
-"""Collocation at Gauss points."""
+"""Collocation at Gauss points; the coefficients and the compiled twin are in `discs.integrators.collocation`."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -6,35 +6,35 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.integrators.base import OneStep, Work
 from discs.integrators.collocation import Collocation, Tableau, tableau
 from discs.skew import Phase, SkewGradient, add
 
 
 class Guide(ABC):
-    """What guides the sweeps of a step: a first guess, and a C that does not change from sweep to sweep."""
+    """The frozen part of the sweeps of a step: a first guess, and linear systems with one C for all sweeps."""
 
     @abstractmethod
-    def rates(self, p: NDArray) -> NDArray:
+    def rates(self, p: Float) -> Float:
         """A first guess of the rates of the stages, (s, rows, n), for their momenta (s, ...)."""
 
     @abstractmethod
-    def solve(self, value: complex, rest: NDArray) -> NDArray:
+    def solve(self, value: complex, rest: Float) -> Float:
         """Solve (I + h value C^T D C + (h value)^2 C^T S C) p = rest for p, of the shape of pi."""
 
     @abstractmethod
-    def moved(self, change: NDArray, before: NDArray, v: NDArray, p: NDArray) -> tuple[float, NDArray, NDArray]:
-        """How far a sweep moved the stages, in units of the system's scale, and rates and momenta to go on with.
+    def moved(self, change: Float, before: Float, v: Float, p: Float) -> tuple[float, Float, Float]:
+        """The largest move of a stage by a sweep, in units of the scale of the system, and rates and momenta for the next sweep.
 
         The sweep changed the momenta by `change` to p and the rates from `before` to v.
         """
 
 
 class Common(Guide):
-    """C in the middle of the step, by the velocity at its start."""
+    """C in the middle of the step, extrapolated with the velocity at its start."""
 
     def __init__(self, system: SkewGradient, z: Phase, h: float) -> None:
         self._system, self._h = system, h
@@ -42,20 +42,20 @@ class Common(Guide):
         middle = system.moved(shape, 0.5 * h * system.forward(system.basis(shape), z.pi))
         self._c, self._secant = system.basis(middle), system.secant(middle, np.zeros_like(z.hi))
 
-    def rates(self, p: NDArray) -> NDArray:
+    def rates(self, p: Float) -> Float:
         return np.array([self._system.forward(self._c, stage) for stage in p])
 
-    def solve(self, value: complex, rest: NDArray) -> NDArray:
+    def solve(self, value: complex, rest: Float) -> Float:
         return self._system.solve(self._secant, self._c, self._h * self._h * value**2, rest, self._h * value)
 
-    def moved(self, change: NDArray, before: NDArray, v: NDArray, p: NDArray) -> tuple[float, NDArray, NDArray]:
+    def moved(self, change: Float, before: Float, v: Float, p: Float) -> tuple[float, Float, Float]:
         far = np.abs([0.5 * self._h * self._system.forward(self._c, stage) for stage in change]).max(axis=(0, 2))
         return float((far / self._system.scale).max()), v, p
 
 
 def collocate(
     system: SkewGradient, z: Phase, t: float, h: float, rule: Tableau, guide: Guide, sweeps: int, tolerance: float
-) -> tuple[Phase, NDArray, NDArray, int]:
+) -> tuple[Phase, Float, Float, int]:
     """The state a time h after z at t, the rates (s, rows, n) and momenta (s, ...) of the stages, and the number of sweeps."""
     shape = system.shape(z.hi, z.lo)
     parts = [
@@ -86,12 +86,12 @@ class Gauss(OneStep, ABC):
 
     Gauss methods conserve quadratic invariants, H with linear curvature among them.
 
-    A sweep takes C at the stages' positions, lets it carry them on, and solves for the change of the P_i with one common C,
-    that in the middle of the step: for this C the equations are linear, I + h^2 a^2 (x) C^T S C, and fall apart along the
-    eigenvectors of a into systems I + h^2 lambda^2 C^T S C, one complex one for each pair. They are factored once a step. (With
-    own headings S is the springs' stiffness without what their tension adds.) Unlike in a midpoint step the energy is exact
-    only when the sweeps have converged; when h is many times larger than the time in which a wave passes from disc to disc they
-    do not: take "midpoint" then.
+    A sweep evaluates C at the stages, moves the stages with it, and solves for the change of the P_i with one common C, the one in
+    the middle of the step. For this C the equations are linear, with the matrix I + h^2 a^2 (x) C^T S C. The eigenvectors of a
+    decouple it into systems I + h^2 lambda^2 C^T S C, one complex system for each pair. They are factored once per step. (With own
+    headings S is the stiffness of the springs without the part due to their tension.) Unlike in a midpoint step, the energy is
+    exact only if the sweeps converge. They do not if h is many times the time in which a wave passes from disc to disc: take
+    "midpoint" then.
 
     Parameters
     ----------
@@ -129,9 +129,10 @@ class Gauss(OneStep, ABC):
         return Collocation(tableau(self.stages), self.sweeps, float(self.tolerance))
 
 
-def _mix(weights: NDArray, stages: NDArray) -> NDArray:
-    """Sums of stages (s, ...) with weights (s,) or (m, s)."""
-    return (weights @ stages.reshape(len(stages), -1)).reshape(*weights.shape[:-1], *stages.shape[1:])
+def _mix(weights: Float, stages: Float) -> Float:
+    """Sums of stages (s, ...) with weights (s,), or several with weights (m, s)."""
+    mixed: Float = (weights @ stages.reshape(len(stages), -1)).reshape(*weights.shape[:-1], *stages.shape[1:])
+    return mixed
 
 
 class Gauss4(Gauss):
