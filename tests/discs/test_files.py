@@ -128,7 +128,7 @@ def test_an_archive_older_than_its_restart_file_is_refused_at_the_beginning(tmp_
         np.savez(new, **kept | {"frame": 4})
     there = load(path).t.size
     assert 0 < there < 4
-    monkeypatch.setattr("discs.running.time_loop.March.to", None)  # not a step
+    monkeypatch.setattr("discs.running.time_loop.March.on", None)  # not a step
     message = (
         rf"run\.nc is older than run\.nc\.restart, which goes on at frame 4: frame {there} is not there; without it the run starts"
     )
