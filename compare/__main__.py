@@ -29,6 +29,11 @@ LAWS: dict[str, Callable[[], Scene]] = {
 }
 
 
+def about(what: object) -> str:
+    """The first paragraph of a docstring of a function or module, for `--help`."""
+    return (what.__doc__ or "").split("\n\n")[0]
+
+
 def parser() -> argparse.ArgumentParser:
     """The options."""
     p = argparse.ArgumentParser(
@@ -52,13 +57,13 @@ def parser() -> argparse.ArgumentParser:
     p.set_defaults(run=run_main_job)
     commands = p.add_subparsers(metavar="COMMAND", title="commands (without one: the comparison above)")
     add_precision(
-        commands.add_parser("precision", help="speed against error beside other integrators", description=precision.__doc__)
+        commands.add_parser("precision", help="speed against error beside other integrators", description=about(precision))
     )
-    add_stability(commands.add_parser("stability", help="hard cases by every method", description=stability.__doc__))
+    add_stability(commands.add_parser("stability", help="hard cases by every method", description=about(stability)))
     add_trust(
-        commands.add_parser("trust", help="random scenes: whether errors stay below the tolerances", description=trust.__doc__)
+        commands.add_parser("trust", help="random scenes: whether errors stay below the tolerances", description=about(trust))
     )
-    add_report(commands.add_parser("report", help="everything on one page", description=report.__doc__))
+    add_report(commands.add_parser("report", help="everything on one page", description=about(report)))
     return p
 
 
