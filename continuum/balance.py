@@ -33,11 +33,11 @@ omega. eliminated. Differences in time give d_t D, and the Q of the first row, s
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import make_interp_spline
 
 from continuum.rod import Rod, SteeredRod
 from discs import Solution, checks
+from discs.arrays import Float, Spline
 from discs.chains.rolling import ROLLING
 
 DEGREE = 7
@@ -53,12 +53,12 @@ class Balance(NamedTuple):
     unforced : (F - 2, N), the same without the source.
     """
 
-    density: NDArray
-    flux: NDArray
-    source: NDArray
-    violation: NDArray
-    residual: NDArray
-    unforced: NDArray
+    density: Float
+    flux: Float
+    source: Float
+    violation: Float
+    residual: Float
+    unforced: Float
 
 
 def balances(
@@ -91,10 +91,10 @@ def balances(
 
     period, advance = rod.length if closed else None, np.asarray(shift)[:, None, None] / rod.length
 
-    def along(values: NDArray, order: int = 1) -> NDArray:
+    def along(values: Float, order: int = 1) -> Float:
         return _spline(run.s, values, period).derivative(order)(run.s)
 
-    def in_time(values: NDArray) -> NDArray:
+    def in_time(values: Float) -> Float:
         return np.gradient(values, run.t, axis=-2, edge_order=2)
 
     r, theta1, omega = np.stack([run.x, run.y]), along(run.theta), run.omega
@@ -144,28 +144,31 @@ def noether(found: dict[str, Balance]) -> dict[str, float]:
     return {name: float(law.violation.max()) for name, law in found.items()}
 
 
-def _dot(a: NDArray, b: NDArray) -> NDArray:
-    return (a * b).sum(axis=0)
+def _dot(a: Float, b: Float) -> Float:
+    product: Float = (a * b).sum(axis=0)
+    return product
 
 
-def _cross(a: NDArray, b: NDArray) -> NDArray:
-    return a[0] * b[1] - a[1] * b[0]
+def _cross(a: Float, b: Float) -> Float:
+    product: Float = a[0] * b[1] - a[1] * b[0]
+    return product
 
 
-def _turned(a: NDArray) -> NDArray:
+def _turned(a: Float) -> Float:
     """J a."""
     return np.stack([-a[1], a[0]])
 
 
-def _spline(s: NDArray, values: NDArray, period: float | None) -> BSpline:
+def _spline(s: Float, values: Float, period: float | None) -> Spline:
     """Spline of degree 7 through values (..., N), periodic if there is a period."""
-    if period is None:
-        return make_interp_spline(s, values, DEGREE, axis=-1)
-    around = np.concatenate([values, values[..., :1]], axis=-1)
-    return make_interp_spline(np.append(s, s[0] + period), around, DEGREE, bc_type="periodic", axis=-1)
+    ends = None
+    if period is not None:
+        s, values, ends = np.append(s, s[0] + period), np.concatenate([values, values[..., :1]], axis=-1), "periodic"
+    spline: Spline = make_interp_spline(s, values, DEGREE, bc_type=ends, axis=-1)
+    return spline
 
 
-def _at_nodes(s: NDArray, tension: NDArray, period: float | None) -> NDArray:
+def _at_nodes(s: Float, tension: Float, period: float | None) -> Float:
     """Tension of links at the nodes, (F, N); it is zero at free ends."""
     middle = s[: tension.shape[1]] + s[1] / 2
     if period is not None:

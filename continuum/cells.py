@@ -19,10 +19,10 @@ The paper's 6-cell has no level n-1; its section 4.3 uses it in phi_d (central d
 `continuum.lattice` turns a `CellTheory` into residuals and steps. Letters of this module: n, i; the steps h in time and k in s.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import sympy as sy
 from sympy.core.function import AppliedUndef
@@ -65,7 +65,7 @@ def velocity(field: sy.IndexedBase) -> sy.Symbol:
     return sy.Symbol(f"d{field.label}/dt")
 
 
-def in_space(expression: Any, coordinates: tuple[sy.Symbol, sy.Symbol], forward: Iterable[Any] = ()) -> sy.Expr:
+def in_space(expression: sy.Expr, coordinates: tuple[sy.Symbol, sy.Symbol], forward: Iterable[AppliedUndef] = ()) -> sy.Expr:
     """Replace fields by values at (n, i), time derivatives by velocities, derivatives in s by differences: (FDeta), (FDtheta).
 
     y' is (y_{n,i+1} - y_{n,i-1})/2k, for fields named in `forward` (y_{n,i+1} - y_{n,i})/k; y'' is the second difference.
@@ -98,7 +98,7 @@ def in_space(expression: Any, coordinates: tuple[sy.Symbol, sy.Symbol], forward:
     return expression.xreplace(rules)
 
 
-def in_time(expression: Any, fields: Iterable[sy.IndexedBase], difference: str) -> sy.Expr:
+def in_time(expression: sy.Expr, fields: Iterable[sy.IndexedBase], difference: str) -> sy.Expr:
     """Replace velocities: "forward", (y_{n+1,i} - y_{n,i})/h, or "central", (y_{n+1,i} - y_{n-1,i})/2h."""
     back = {"forward": 0, "central": 1}[checks.choice("difference", difference, ("forward", "central"))]
     rules = {velocity(y): (y[n + 1, i] - y[n - back, i]) / ((1 + back) * h) for y in fields}
@@ -115,7 +115,7 @@ class Part:
     cells : None, all nodes i whose cells lie on the lattice; a slice of these nodes; or a whole number, one cell at an end.
     """
 
-    expression: Any
+    expression: sy.Expr
     cells: slice | int | None = None
 
     def __post_init__(self) -> None:
@@ -134,7 +134,7 @@ class Constraint(Part):
     discrete : phi_d, in values of the levels n-1, n, n+1; None, phi_half with differences for the velocities.
     """
 
-    discrete: Any = None
+    discrete: sy.Expr | None = None
 
 
 @dataclass(frozen=True)
@@ -154,9 +154,9 @@ class CellTheory:
     ValueError : for unknown fields, values outside the levels allowed, and a constraint without velocities.
     """
 
-    lagrangian: Any
-    fields: tuple[Any, ...]
-    constraints: Any = ()
+    lagrangian: Sequence[Part]
+    fields: Sequence[sy.IndexedBase]
+    constraints: Sequence[Constraint] = ()
     difference: str = "central"
 
     def __post_init__(self) -> None:

@@ -19,9 +19,9 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from continuum.galerkin import Modes, SpectralRod
+from discs.arrays import Float
 from discs.integrators.collocation import Collocation, tableau
 from discs.integrators.gauss import Guide, collocate
 from discs.skew import Phase, add
@@ -33,15 +33,15 @@ class Frozen(Guide):
     def __init__(self, rod: SpectralRod, z: Phase, modes: Modes, h: float, tolerance: float) -> None:
         self._rod, self._modes, self._h, self._tolerance = rod, modes, h, tolerance
         self._start = rod.basis(z.hi + z.lo)
-        self._results: list[tuple[NDArray, NDArray, NDArray]] = []
+        self._results: list[tuple[Float, Float, Float]] = []
 
-    def rates(self, p: NDArray) -> NDArray:
+    def rates(self, p: Float) -> Float:
         return self._rod.forward(self._start, p)
 
-    def solve(self, value: complex, rest: NDArray) -> NDArray:
+    def solve(self, value: complex, rest: Float) -> Float:
         return self._modes.vectors @ ((self._modes.back @ rest) / (1 + self._h**2 * value**2 * self._modes.values))
 
-    def moved(self, change: NDArray, before: NDArray, v: NDArray, p: NDArray) -> tuple[float, NDArray, NDArray]:
+    def moved(self, change: Float, before: Float, v: Float, p: Float) -> tuple[float, Float, Float]:
         moved = v - before
         far = float((np.abs(0.5 * self._h * moved) / self._rod.scale[:, None]).max())
         if far <= self._tolerance or not np.isfinite(far):
@@ -54,7 +54,7 @@ class Frozen(Guide):
 
 def step(
     rod: SpectralRod, z: Phase, modes: Modes, t: float, h: float, stages: int, sweeps: int, tolerance: float, compiled: bool = True
-) -> tuple[Phase, NDArray, NDArray, int]:
+) -> tuple[Phase, Float, Float, int]:
     """The state a time h after z at t, the rates (stages, 3, n) and momenta (stages, n) of the stages, and the number of sweeps.
 
     Parameters
@@ -78,7 +78,7 @@ def step(
     return after._replace(pi=after.pi[0]), v, p[:, 0], 0 if cost[2] else cost[0] // stages
 
 
-def within(z: Phase, h: float, v: NDArray, p: NDArray, parts: NDArray) -> Phase:
+def within(z: Phase, h: float, v: Float, p: Float, parts: Float) -> Phase:
     """The states at z's time plus `parts` (F,) of a step's h, each array with F before its axes; v and p as `step` returns them."""
     rates, momenta = _polynomials(len(v))
     series = legendre.legvander(2 * parts - 1, len(v))
@@ -86,14 +86,14 @@ def within(z: Phase, h: float, v: NDArray, p: NDArray, parts: NDArray) -> Phase:
 
 
 @cache
-def _polynomials(stages: int) -> tuple[NDArray, NDArray]:
+def _polynomials(stages: int) -> tuple[Float, Float]:
     """Legendre coefficients, (stages + 1, stages), of int_0^tau l_j and of L_j."""
     nodes, _ = legendre.leggauss(stages)
     rates = legendre.legint(np.linalg.inv(legendre.legvander(nodes, stages - 1)), lbnd=-1) / 2
     return rates, np.linalg.inv(legendre.legvander(np.concatenate([[-1.0], nodes]), stages))[:, 1:]
 
 
-def mixing(changes: list[NDArray]) -> NDArray:
+def mixing(changes: list[Float]) -> Float:
     """Factors of sum one that make the sum of at most three changes the least; the newest comes first."""
     newest = changes[0].ravel()
     less = np.array([newest - other.ravel() for other in changes[1:]]).reshape(-1, newest.size)

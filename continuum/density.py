@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from continuum.initial import Resolved
+from discs.arrays import Float
 
 REACH = 2.5  # of a centre, in widths of its feature
 CROWD = 0.3  # of a centre: its share of xi, over that of the whole rod
@@ -44,7 +44,7 @@ class Density:
             return cls(length)
         return cls(length, tuple(centres))
 
-    def _grown(self, s: NDArray | float) -> NDArray:
+    def _grown(self, s: Float | float) -> Float:
         """int xi' ds, but for a factor and a constant."""
         total = np.array(s, dtype=float)
         for place, reach, height in self.centres:
@@ -55,7 +55,7 @@ class Density:
     def _scale(self) -> float:
         return 2 / float(self._grown(self.length) - self._grown(0.0))
 
-    def _even(self, s: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def _even(self, s: Float) -> tuple[Float, Float, Float]:
         """u, u', u'' at places s (S,)."""
         u = np.clip(self._scale * (self._grown(s) - self._grown(0.0)) - 1, -1.0, 1.0)
         rate, change = np.ones_like(s), np.zeros_like(s)
@@ -65,24 +65,25 @@ class Density:
             change -= 2 * height * x / reach / (1 + x * x) ** 2
         return u, self._scale * rate, self._scale * change
 
-    def coordinate(self, s: NDArray) -> NDArray:
+    def coordinate(self, s: Float) -> Float:
         """xi at places s (S,)."""
         u, _, _ = self._even(s)
         return np.sin(EVEN * u) / np.sin(EVEN) if self.centres else u
 
-    def rate(self, s: NDArray) -> NDArray:
+    def rate(self, s: Float) -> Float:
         """xi' at places s (S,), 1/length."""
         u, rate, _ = self._even(s)
         return EVEN * np.cos(EVEN * u) / np.sin(EVEN) * rate if self.centres else rate
 
-    def change(self, s: NDArray) -> NDArray:
+    def change(self, s: Float) -> Float:
         """xi'' at places s (S,), 1/length^2."""
         u, rate, change = self._even(s)
         if not self.centres:
             return change
-        return EVEN / np.sin(EVEN) * (np.cos(EVEN * u) * change - EVEN * np.sin(EVEN * u) * rate**2)
+        second: Float = EVEN / np.sin(EVEN) * (np.cos(EVEN * u) * change - EVEN * np.sin(EVEN * u) * rate**2)
+        return second
 
-    def place(self, xi: NDArray) -> NDArray:
+    def place(self, xi: Float) -> Float:
         """s at xi (S,): by halving, then by Newton steps to round-off."""
         if not self.centres:
             return (xi + 1) * (self.length / 2)

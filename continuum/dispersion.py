@@ -3,18 +3,19 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from continuum.rod import Rod, SteeredRod
 from discs import checks
+from discs.arrays import Float
 from discs.chains.rolling import ROLLING, stretching
 
 
 class Symbols(NamedTuple):
     """What stands for q^2 in second differences (stiffness) and for q in headings."""
 
-    second: NDArray
-    first: NDArray
+    second: Float
+    first: Float
 
 
 def symbols(q: ArrayLike, k: float | None = None) -> Symbols:
@@ -23,7 +24,7 @@ def symbols(q: ArrayLike, k: float | None = None) -> Symbols:
     return Symbols(q**2, q) if k is None else Symbols((2 / k * np.sin(q * k / 2)) ** 2, np.sin(q * k) / k)
 
 
-def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> NDArray:
+def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> Float:
     """Frequency Omega of small waves of the straight rod at rest: (alpha + rho R^2) Omega^2 = beta q^2 + K R^2 q^4.
 
     Parameters
@@ -35,7 +36,7 @@ def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> NDArray:
     return np.sqrt((rod.torsion_stiffness * t + rod.bending_stiffness * rod.radius**2 * t**2) / rod.inertia)
 
 
-def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: float | None = None) -> NDArray:
+def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: float | None = None) -> Float:
     """Largest growth rate sigma of a perturbation of wave number q of the straight rod rolling sideways at rate omega.
 
     With M = alpha + rho R^2 and gamma = `stretching(law)`, 1 under the field law and 0 under the unit law, the largest real part of
@@ -56,11 +57,11 @@ def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: floa
     # both forms of the larger root of M u^2 + b u - last, each where it does not cancel
     with np.errstate(divide="ignore", invalid="ignore"):
         square = np.where(b > 0, 2 * last / (root + b), (root - b) / (2 * rod.inertia))
-    growing: NDArray = np.emath.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square)).real
+    growing: Float = np.emath.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square)).real
     return growing
 
 
-def steered_frequencies(rod: SteeredRod, q: ArrayLike, k: float | None = None) -> NDArray:
+def steered_frequencies(rod: SteeredRod, q: ArrayLike, k: float | None = None) -> Float:
     """Frequencies of small waves of the straight rod whose sections have headings of their own, at rest or rolling.
 
     With small phi, y = R theta + const and sideways force G (y' - phi): (M Omega^2 - (beta + G R^2) q^2)(J Omega^2 - K q^2 - G)

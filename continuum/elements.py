@@ -20,12 +20,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from continuum.initial import resolve
 from continuum.pieces import POINTS
 from continuum.rod import Scene, SteeredRod
+from discs.arrays import Float, Int
 
 DEGREE = 10
 MOST_CALLS = 12 * 2**17  # of rates, twelve to a step
@@ -33,7 +33,7 @@ TRIED = 12 * 2**8  # calls that tell how many all of it will take
 UNKNOWNS = ("x", "y", "theta", "phi", "omega", "phi_rate")
 
 
-def lobatto(p: int) -> tuple[NDArray, NDArray, NDArray]:
+def lobatto(p: int) -> tuple[Float, Float, Float]:
     """Gauss-Lobatto nodes and weights of degree p on [-1, 1], (p+1,), and the derivative of the polynomial through them."""
     basis = legendre.Legendre.basis(p)
     x = np.concatenate([[-1.0], np.sort(basis.deriv().roots().real), [1.0]])
@@ -60,18 +60,18 @@ class Elements:
     count: int
 
     @cached_property
-    def _rule(self) -> tuple[NDArray, NDArray, NDArray]:
+    def _rule(self) -> tuple[Float, Float, Float]:
         x, w, d = lobatto(DEGREE)
         half = self.scene.rod.length / self.count / 2
         return x, w * half, d / half
 
     @cached_property
-    def _expand(self) -> NDArray:
+    def _expand(self) -> Float:
         """Values at an element's nodes to Legendre coefficients, (DEGREE + 1, DEGREE + 1)."""
-        return np.linalg.inv(legendre.legvander(self._rule[0], DEGREE))
+        return np.linalg.inv(legendre.legvander(self._rule[0], DEGREE)).astype(np.float64, copy=False)
 
     @cached_property
-    def _index(self) -> NDArray:
+    def _index(self) -> Int:
         """Nodes of each element, (count, DEGREE + 1)."""
         index = DEGREE * np.arange(self.count)[:, None] + np.arange(DEGREE + 1)
         return index % self.n if self.scene.closed else index
@@ -82,7 +82,7 @@ class Elements:
         return DEGREE * self.count + (not self.scene.closed)
 
     @cached_property
-    def s(self) -> NDArray:
+    def s(self) -> Float:
         """Places of the nodes, (n,)."""
         x = self._rule[0]
         width = self.scene.rod.length / self.count
@@ -90,11 +90,11 @@ class Elements:
         return local[:, :-1].ravel() if self.scene.closed else np.append(local[:, :-1].ravel(), local[-1, -1])
 
     @cached_property
-    def weights(self) -> NDArray:
+    def weights(self) -> Float:
         """Length that each node stands for, (n,)."""
         return self._sum(np.broadcast_to(self._rule[1], self._index.shape))
 
-    def _sum(self, local: NDArray) -> NDArray:
+    def _sum(self, local: Float) -> Float:
         """Add values of elements (..., count, DEGREE + 1) up at the nodes, (..., n)."""
         total = np.empty((*local.shape[:-2], self.n))
         inner = self.n - (not self.scene.closed)
@@ -106,7 +106,7 @@ class Elements:
         total[..., DEGREE:inner:DEGREE] += local[..., :-1, -1]
         return total
 
-    def local(self, q: NDArray) -> NDArray:
+    def local(self, q: Float) -> Float:
         """Rows x, y, theta, phi on elements, (4, count, DEGREE + 1); around a closed rod with its shift and turns."""
         values = q[:4, self._index]
         if self.scene.closed:
@@ -114,13 +114,13 @@ class Elements:
             values[3, -1, -1] += 2 * np.pi * self.scene.turns
         return values
 
-    def _strains(self, q: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    def _strains(self, q: Float) -> tuple[Float, Float, Float, Float]:
         values = self.local(q)
         dx, dy, twist, bend = values @ self._rule[2].T
         cos, sin = np.cos(values[3]), np.sin(values[3])
         return np.stack([cos * dx + sin * dy, cos * dy - sin * dx]), twist, bend, np.stack([cos, sin])
 
-    def energy(self, q: NDArray) -> float:
+    def energy(self, q: Float) -> float:
         """Kinetic and potential energy of (6, n)."""
         rod = self._rod
         u, twist, bend, _ = self._strains(q)
@@ -134,7 +134,7 @@ class Elements:
         assert isinstance(self.scene.rod, SteeredRod)  # solve sends nothing else here
         return self.scene.rod
 
-    def rate(self, _: float, flat: NDArray) -> NDArray:
+    def rate(self, _: float, flat: Float) -> Float:
         """The time derivative of the unknowns, flat."""
         rod, (w, d) = self._rod, self._rule[1:]
         q = flat.reshape(6, -1)
@@ -153,7 +153,7 @@ class Elements:
         return out.ravel()
 
     @cached_property
-    def start(self) -> NDArray:
+    def start(self) -> Float:
         """The unknowns of the initial fields, (6, n)."""
         fields = self.scene.fields(self.s)
         return np.stack([fields[name] for name in UNKNOWNS])
@@ -169,11 +169,11 @@ class Elements:
         found = np.einsum("fsk,sk->fs", values[:, element], legendre.legvander(2 * (at - element) - 1, DEGREE))
         return {name: float(np.abs(row - truth[name]).max()) for name, row in zip(UNKNOWNS, found, strict=True)}
 
-    def run(self, times: NDArray, tol: float) -> NDArray:
+    def run(self, times: Float, tol: float) -> Float:
         """The unknowns at the times, (F, 6, n), with an error in time below tol."""
         calls = 0
 
-        def rate(t: float, flat: NDArray) -> NDArray:
+        def rate(t: float, flat: Float) -> Float:
             nonlocal calls
             calls += 1
             if calls > MOST_CALLS or (calls == TRIED and t * MOST_CALLS < TRIED * span[1]):
@@ -187,9 +187,10 @@ class Elements:
         found = solve_ivp(rate, span, self.start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
         if not found.success:
             raise ValueError(f"the field could not be integrated: {found.message}")
-        return found.y.T.reshape(len(times), 6, -1)
+        unknowns: Float = found.y.T.reshape(len(times), 6, -1)
+        return unknowns
 
-    def sample(self, q: NDArray, cells: int) -> NDArray:
+    def sample(self, q: Float, cells: int) -> Float:
         """Rows x, y, theta, phi, theta., phi. of (6, n) at equally spaced places, `cells` of them to an element, (6, places)."""
         through = legendre.legvander(np.linspace(-1, 1, cells, endpoint=False), DEGREE) @ self._expand
         values = np.concatenate([self.local(q), q[4:, self._index]])

@@ -4,22 +4,23 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from continuum.dispersion import frequency, growth, symbols
 from continuum.rod import Rod
 from discs import checks
+from discs.arrays import Float
 from discs.chains.rolling import ROLLING, stretching
 
 
 class Ring(NamedTuple):
     """A breathing ring at times t (F,): radius a (length), roll angle theta and its rate omega, all (F,)."""
 
-    radius: NDArray
-    theta: NDArray
-    omega: NDArray
+    radius: Float
+    theta: Float
+    omega: Float
 
 
 def _collapse(a0: float, inward: float, nu: float) -> float:
@@ -74,14 +75,14 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
         theta = a0 * pull * t**2 / 2 * np.sinc(nu * t / (2 * np.pi)) ** 2 + omega * sine
         return Ring(a, theta, a0 * pull * sine + omega * np.cos(nu * t))
 
-    def rate(_: float, state: NDArray) -> list[float]:
+    def rate(_: float, state: Float) -> list[float]:
         a, _, omega = state
         z, along = np.array([g * a / a0, 0.0]), np.array([1.0, 0.0])
         h, slope = float(law.size(z[0])), float(law.rate(z, along)[0])
         inertia = rod.spin_inertia + rod.density * r**2 * h**2
         return [-r * h * omega, omega, r * h * (rod.density * r**2 * h * slope * omega**2 * g / a0 + stiffness * a) / inertia]
 
-    def point(_: float, state: NDArray) -> float:
+    def point(_: float, state: Float) -> float:
         return float(state[0])
 
     point.terminal = True  # type: ignore[attr-defined]
@@ -95,10 +96,10 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
 class Motion(NamedTuple):
     """A rod's fields at times t (F,) and places s (N,): x, y (length), theta and its rate omega, all (F, N)."""
 
-    x: NDArray
-    y: NDArray
-    theta: NDArray
-    omega: NDArray
+    x: Float
+    y: Float
+    theta: Float
+    omega: Float
 
 
 def rolling_line(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float) -> Motion:
@@ -200,12 +201,12 @@ def growing_wave(
     return Motion(line.x + g / sigma * b * np.sin(q * s), line.y + b * wave, line.theta + a * wave, line.omega + sigma * a * wave)
 
 
-def _axes(s: ArrayLike, t: ArrayLike) -> tuple[NDArray, NDArray]:
+def _axes(s: ArrayLike, t: ArrayLike) -> tuple[Float, Float]:
     """Places (1, N) and times (F, 1)."""
     return np.atleast_1d(np.asarray(s, dtype=float))[None, :], np.atleast_1d(np.asarray(t, dtype=float))[:, None]
 
 
-def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, Callable[[NDArray], NDArray]]:
+def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, Callable[[Float], Float]]:
     """Wave number q and shape g of a standing wave; see `standing_wave`."""
     length, bend = rod.length, rod.bending_stiffness * rod.radius**2
     if closed or not bend:
@@ -226,16 +227,17 @@ def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, C
         """The condition on q, without the poles of tan."""
         p, second, first = ratios(q)
         sin, cos, tanh = np.sin(q * half), np.cos(q * half), np.tanh(p * half)
-        return second**2 * sin - first * cos * tanh if odd else first * sin + second**2 * cos * tanh
+        return float(second**2 * sin - first * cos * tanh if odd else first * sin + second**2 * cos * tanh)
 
-    q = brentq(end, max(mode - 1, 1e-6) * np.pi / length, mode * np.pi / length, xtol=1e-15, rtol=1e-14)
+    q = float(brentq(end, max(mode - 1, 1e-6) * np.pi / length, mode * np.pi / length, xtol=1e-15, rtol=1e-14))
     p, second, _ = ratios(q)
 
-    def g(s: NDArray) -> NDArray:
+    def g(s: Float) -> Float:
         z, sign = s - half, -1.0 if odd else 1.0
         wave = np.sin(q * z) / np.sin(q * half) if odd else np.cos(q * z) / np.cos(q * half)
         # cosh(p z)/cosh(p l/2), or sinh, safe for large p
         decaying = np.exp(p * (z - half)) + sign * np.exp(-p * (z + half))
-        return sign * (wave + second * decaying / (1 + sign * np.exp(-p * length))) / (1 + second)
+        shape: Float = sign * (wave + second * decaying / (1 + sign * np.exp(-p * length))) / (1 + second)
+        return shape
 
     return q, g

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from continuum import exact
 from continuum.balance import balances
@@ -17,13 +16,14 @@ from continuum.mesh import semidiscretise
 from continuum.rod import Rod, Scene
 from continuum.scenes import rolling_rod, untwisting_rod
 from discs import Midpoint, Suzuki4, simulate
+from discs.arrays import Float
 from discs.chains.rolling import ROLLING, stretching
 from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, SIGNED, UNSIGNED
 
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 
 
-def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, duration: float = 1.0) -> NDArray:
+def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, duration: float = 1.0) -> Float:
     """Growth rates (modes,) of waves 1, 2, ... of n discs that roll sideways at the rate omega, from one simulation.
 
     It starts from all waves at once, small enough to pass through each other: growing ones under the field law, standing ones
@@ -31,7 +31,7 @@ def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, du
     """
     waves, grows = range(1, modes + 1), bool(stretching(ROLLING[rolling]))
 
-    def initial(s: NDArray) -> tuple[NDArray, ...]:
+    def initial(s: Float) -> tuple[Float, ...]:
         line = exact.rolling_line(rod, s, 0.0, omega)
         start = np.array(line)[:, 0]
         for mode in waves:
@@ -48,11 +48,11 @@ def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, du
     scene = replace(rolling_rod(rolling, duration=duration), rod=rod, initial=initial, shift=(rod.length, 0.0))
     run = simulate(semidiscretise(scene, n, "ring"), FINE, duration / 200, frames=2, progress=False)
     theta, rate = (np.abs(np.fft.rfft(values, axis=1)[:, 1 : modes + 1]) for values in (run.theta, run.omega))
-    if grows:
-        return np.log(theta[1] / theta[0]) / duration
-    own = frequency(rod, 2 * np.pi * np.arange(1, modes + 1) / rod.length, rod.length / n)
-    size = np.hypot(theta, rate / own)
-    return np.log(size[1] / size[0]) / duration
+    size: Float = theta
+    if not grows:
+        size = np.hypot(theta, rate / frequency(rod, 2 * np.pi * np.arange(1, modes + 1) / rod.length, rod.length / n))
+    rates: Float = np.log(size[1] / size[0]) / duration
+    return rates
 
 
 def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: Axes | None = None) -> Axes:

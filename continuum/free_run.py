@@ -1,9 +1,8 @@
 """Runs of the free rod, watched by their energy, and how far they are off by a coarser one."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 from tqdm import tqdm
 
@@ -11,6 +10,7 @@ from continuum.free_start import Given, through
 from continuum.free_system import FreeRod, State
 from continuum.rod import Rod
 from discs import Chain, SimulationError
+from discs.arrays import Float
 from discs.chains.chain import FEWEST
 from discs.simulation import ENERGY_DRIFT_WARNING
 
@@ -33,8 +33,8 @@ class Run(NamedTuple):
     off : what to warn of: energy that is not what it was; empty where it is.
     """
 
-    fields: dict[str, Any]
-    energy: NDArray
+    fields: dict[str, Float]
+    energy: Float
     steps: int
     off: str
 
@@ -106,7 +106,7 @@ class Watch:
         )
 
 
-def run(chain: Chain, start: Start, h: float, times: NDArray, bar: tqdm) -> Run:
+def run(chain: Chain, start: Start, h: float, times: Float, bar: tqdm) -> Run:
     """The motion at times, in steps h."""
     r, v, theta, omega = (given.at(chain.s) if given.nodes.shape[1] != chain.n else given.nodes for given in start)
     system = FreeRod(chain, r)
@@ -141,7 +141,7 @@ def run(chain: Chain, start: Start, h: float, times: NDArray, bar: tqdm) -> Run:
     return Run(dict(zip(names, fields, strict=True)), np.array([system.energy(z) for z in found]), step, watch.said())
 
 
-def compare(rod: Rod, chain: Chain, start: Start, h: float, times: NDArray, fine: Run, bar: tqdm) -> tuple[Errors | None, str]:
+def compare(rod: Rod, chain: Chain, start: Start, h: float, times: Float, fine: Run, bar: tqdm) -> tuple[Errors | None, str]:
     """Estimated errors of a run by name, and what to warn of.
 
     A run on half the nodes in twice the step is off by four times as much, as both orders are two: the error is a third of the
@@ -186,7 +186,7 @@ def compare(rod: Rod, chain: Chain, start: Start, h: float, times: NDArray, fine
     return errors, f"free_rod: estimated errors: {', '.join(bad)}; take more nodes and a smaller dt, to begin with {finer}"
 
 
-def _scales(rod: Rod, chain: Chain, fields: dict[str, NDArray]) -> tuple[dict[str, float], dict[str, float]]:
+def _scales(rod: Rod, chain: Chain, fields: dict[str, Float]) -> tuple[dict[str, float], dict[str, float]]:
     """What errors are held against, by name, and what rounding may leave.
 
     The first is the length, the largest speed about the mean, the range of theta and of omega along the rod, the largest tension.

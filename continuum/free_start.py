@@ -14,14 +14,15 @@ measured, not the chord of a link, which lacks psi^2/24 of an arc that turns by 
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline, make_interp_spline
+from numpy.typing import ArrayLike
+from scipy.interpolate import make_interp_spline
 
 from continuum.elements import lobatto
 from discs import Chain, checks
+from discs.arrays import Float, Spline
 from discs.chains import stencils
 
-Data = Callable[[NDArray], ArrayLike] | ArrayLike
+Data = Callable[[Float], ArrayLike] | ArrayLike
 STRAIN = 1e-6  # what | |r'| - 1 | and r'.v', beside the largest |v'|, may be by rounding of the user's
 UNKNOWN = 5e-4  # what they may be besides where arrays leave them open
 SHORT = 0.05  # of k: what links of an earlier run may lack, the chord of one radian
@@ -52,11 +53,11 @@ class Given:
 
     def __init__(self, name: str, data: Data, rows: int, chain: Chain) -> None:
         self.name, self._rows, self._chain = name, rows, chain
-        self.call: Callable[[NDArray], ArrayLike] | None = data if callable(data) else None
+        self.call: Callable[[Float], ArrayLike] | None = data if callable(data) else None
         self.nodes = self._read(data(chain.s) if callable(data) else data, chain.n)
         self.rounding = ULPS * float(np.abs(self.nodes).max()) / chain.k
 
-    def _read(self, values: ArrayLike, size: int) -> NDArray:
+    def _read(self, values: ArrayLike, size: int) -> Float:
         if self._rows == 1:
             return checks.field(self.name, values, size)[None]
         try:
@@ -68,13 +69,13 @@ class Given:
             raise ValueError(f"{self.name} must give x and y, an array of shape {(2, size)}{asked}; got shape {shape}")
         return np.array([checks.field(self.name, row, size) for row in values])  # type: ignore[union-attr]
 
-    def at(self, s: NDArray, degree: int = DEGREE) -> NDArray:
+    def at(self, s: Float, degree: int = DEGREE) -> Float:
         """Values at places s, (rows, s.size), of an array by a spline."""
         if self.call is not None:
             return self._read(self.call(s), s.size)
         return through(self._chain, self.nodes, degree)(s)
 
-    def slopes(self, places: NDArray) -> tuple[NDArray, NDArray]:
+    def slopes(self, places: Float) -> tuple[Float, Float]:
         """d/ds at the places of each link, (2, n_links, 13), and how far an array leaves it open, (n_links, 13)."""
         if self.call is None:
             slope, lower = (through(self._chain, self.nodes, g).derivative()(places) for g in (DEGREE, DEGREE - 2))
@@ -82,19 +83,20 @@ class Given:
         values = self.at(places.ravel()).reshape(2, *places.shape)
         return (values - values[..., :1]) @ D.T * (2 / self._chain.k), np.zeros(places.shape)
 
-    def links(self) -> NDArray:
+    def links(self) -> Float:
         """L/k, (2, n_links)."""
         return stencils.links(self.nodes, self._chain.ends) / self._chain.k
 
 
-def through(chain: Chain, values: NDArray, degree: int = DEGREE, offset: float = 0.0) -> BSpline:
+def through(chain: Chain, values: Float, degree: int = DEGREE, offset: float = 0.0) -> Spline:
     """Spline through values (..., n) at nodes, or (..., n_links) at places `offset` after them; periodic around a ring."""
     s = chain.s[: values.shape[-1]] + offset
     if chain.ends == "ring":
         s = np.concatenate([s - chain.length, s, s + chain.length])
         values = np.concatenate([values] * 3, axis=-1)
     most = max(1, s.size - 1 - (DEGREE - degree))
-    return make_interp_spline(s, values, degree if degree <= most else most - (most % 2 == 0), axis=-1)
+    spline: Spline = make_interp_spline(s, values, degree if degree <= most else most - (most % 2 == 0), axis=-1)
+    return spline
 
 
 def check(chain: Chain, r: Given, v: Given) -> str:
@@ -113,11 +115,12 @@ def check(chain: Chain, r: Given, v: Given) -> str:
     places, dr, dv = places[:, here], dr[..., here], dv[..., here]
     speed = float(np.abs(dv).max())
     strain = np.abs((dr * dv).sum(axis=0))
-    allowed = STRAIN * speed + v.rounding + r.rounding * speed
+    rounding = STRAIN * speed + v.rounding + r.rounding * speed
+    allowed = np.full_like(strain, rounding)
     if here is MIDDLE:
-        if np.abs((r.links() * v.links()).sum(axis=0)).max() <= allowed:
+        if np.abs((r.links() * v.links()).sum(axis=0)).max() <= rounding:
             strain = np.zeros_like(strain)
-        allowed = allowed + np.minimum(open_r[:, here] * speed + open_v[:, here], UNKNOWN * speed)
+        allowed = rounding + np.minimum(open_r[:, here] * speed + open_v[:, here], UNKNOWN * speed)
     if (strain > allowed).any():
         at = _worst(strain - allowed)
         raise ValueError(
@@ -127,7 +130,7 @@ def check(chain: Chain, r: Given, v: Given) -> str:
     return _bent_ends(chain, r) if chain.ends != "ring" else ""
 
 
-def _line(chain: Chain, r: Given, places: NDArray, dr: NDArray, doubt: NDArray) -> None:
+def _line(chain: Chain, r: Given, places: Float, dr: Float, doubt: Float) -> None:
     """Refuse a line that is stretched or has a kink."""
     length, allowed = np.hypot(*dr), STRAIN + r.rounding + np.minimum(doubt, UNKNOWN)
     off = np.abs(length - 1)
@@ -195,7 +198,7 @@ def _bent_ends(chain: Chain, r: Given) -> str:
     rounding = ULPS * float(np.abs(r.nodes).max()) / wide * np.array([1e2 / wide, 1e5 / wide**2])
     for end, inwards in ((0.0, 1.0), (chain.length, -1.0)):
 
-        def ends(degree: int, end: float = end, inwards: float = inwards) -> NDArray:
+        def ends(degree: int, end: float = end, inwards: float = inwards) -> Float:
             """kappa and kappa' there."""
             values = r.at(end + inwards * wide * (X + 1) / 2, degree)
             values, d = values - values[:, :1], D.T * (2 * inwards / wide)
@@ -218,6 +221,6 @@ def _bent_ends(chain: Chain, r: Given) -> str:
     return ""
 
 
-def _worst(values: NDArray) -> tuple[int, ...]:
+def _worst(values: Float) -> tuple[int, ...]:
     """The index of the largest entry."""
     return tuple(int(i) for i in np.unravel_index(np.argmax(values), values.shape))

@@ -31,10 +31,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_banded
 
 from discs import Chain
+from discs.arrays import Float, Int
 from discs.chains import stencils
 from discs.chains.links.linear import LinearCurvature
 from discs.chains.rolling_discs import folded
@@ -45,27 +45,28 @@ MOST_SWEEPS = 30
 class State(NamedTuple):
     """Places and velocities (2, n), torsion and its rate (n,)."""
 
-    r: NDArray
-    v: NDArray
-    theta: NDArray
-    omega: NDArray
+    r: Float
+    v: Float
+    theta: Float
+    omega: Float
 
 
 class Banded:
     """Solves systems whose entries stand at fixed places, few places from the diagonal in a given order of the unknowns."""
 
-    def __init__(self, places: list[tuple[NDArray, NDArray]], order: NDArray) -> None:
+    def __init__(self, places: list[tuple[Int, Int]], order: Int) -> None:
         place = np.argsort(order)
         row, column = (place[np.concatenate(index)] for index in zip(*places, strict=True))
         self._width, self._order, self._back = int(abs(row - column).max()), order, place
         self._slots = (self._width + row - column) * order.size + column
 
-    def __call__(self, entries: NDArray, right: NDArray) -> NDArray:
+    def __call__(self, entries: Float, right: Float) -> Float:
         """The solution, (size,). Entries at one place add up."""
         shape = 2 * self._width + 1, right.size
         matrix = np.bincount(self._slots, entries, shape[0] * shape[1]).reshape(shape)
         both = self._width, self._width
-        return solve_banded(both, matrix, right[self._order], overwrite_ab=True, check_finite=False)[self._back]
+        solution: Float = solve_banded(both, matrix, right[self._order], overwrite_ab=True, check_finite=False)[self._back]
+        return solution
 
 
 class FreeRod:
@@ -81,11 +82,11 @@ class FreeRod:
     length : (n_links,), of the links.
     """
 
-    def __init__(self, chain: Chain, r: NDArray) -> None:
+    def __init__(self, chain: Chain, r: Float) -> None:
         n, self._ends, self._k = chain.n, chain.ends, chain.k
         self.length = np.hypot(*self.links(r))
         here = np.arange(n - (chain.ends != "ring"))  # links: the i-th joins nodes i and i + 1
-        self._mass, self._spin = chain.w * np.asarray(chain.density), chain.w * np.asarray(chain.spin_inertia)
+        self._mass, self._spin = (chain.w * np.asarray(values, np.float64) for values in (chain.density, chain.spin_inertia))
         self._first, self._second = here, (here + 1) % n
         self._springs = LinearCurvature(chain)
         bending, torsion = self._springs.hessians()
@@ -105,35 +106,35 @@ class FreeRod:
         self._twists = twists.data
         self._roll = Banded([(twists.row, twists.col), (nodes, nodes)], order)
 
-    def links(self, values: NDArray) -> NDArray:
+    def links(self, values: Float) -> Float:
         """L, differences of neighbours, (..., n_links)."""
         return stencils.links(values, self._ends)
 
-    def pull(self, d: NDArray, multiplier: NDArray) -> NDArray:
+    def pull(self, d: Float, multiplier: Float) -> Float:
         """L^T (multiplier d), (2, n)."""
         return stencils.pull(multiplier * d, self._ends)
 
-    def gradient(self, x: NDArray, y: NDArray, theta: NDArray) -> NDArray:
+    def gradient(self, x: Float, y: Float, theta: Float) -> Float:
         """S r and S_t theta, rows (3, n)."""
         return stencils.pull(self._springs.tension(self.links(np.array([x, y, theta]))), self._ends)
 
-    def bent(self, r: NDArray) -> NDArray:
+    def bent(self, r: Float) -> Float:
         """S r, (2, n)."""
         return self.gradient(r[0], r[1], np.zeros_like(r[0]))[:2]
 
-    def _constrain(self, d: NDArray, right: NDArray) -> NDArray:
+    def _constrain(self, d: Float, right: Float) -> Float:
         """The multiplier of d . L M^{-1} L^T (multiplier d) = right."""
         a, b = self._pairs
-        own = (d * d).sum(axis=0) * (1 / self._mass[self._first] + 1 / self._mass[self._second])
-        next_ = -(d[:, a] * d[:, b]).sum(axis=0) / self._mass[self._second[a]]
-        return self._triangle(np.concatenate([own, next_, next_]), right)
+        diagonal = (d * d).sum(axis=0) * (1 / self._mass[self._first] + 1 / self._mass[self._second])
+        beside = -(d[:, a] * d[:, b]).sum(axis=0) / self._mass[self._second[a]]
+        return self._triangle(np.concatenate([diagonal, beside, beside]), right)
 
-    def admissible(self, r: NDArray, v: NDArray) -> NDArray:
+    def admissible(self, r: Float, v: Float) -> Float:
         """The velocity nearest to v, weighed by mass, that changes no link's length."""
         d = self.links(r)
         return v - self.pull(d, self._constrain(d, (d * self.links(v)).sum(axis=0))) / self._mass
 
-    def tension(self, r: NDArray, v: NDArray) -> NDArray:
+    def tension(self, r: Float, v: Float) -> Float:
         """(tension): p in the links, (n_links,)."""
         d, rate = self.links(r), self.links(v)
         push = self.links(self.bent(r) / self._mass)
@@ -149,10 +150,11 @@ class FreeRod:
         v = z.v - (self._mass * z.v).sum(axis=1, keepdims=True) / self._mass.sum()
         return self.energy(State(z.r, v, np.zeros_like(z.theta), np.zeros_like(z.omega)))
 
-    def turns(self, before: NDArray, after: NDArray) -> NDArray:
+    def turns(self, before: Float, after: Float) -> Float:
         """Angles by which links turn between two places r, (n_links,)."""
         a, b = self.links(before), self.links(after)
-        return np.arctan2(a[0] * b[1] - a[1] * b[0], (a * b).sum(axis=0))
+        turns: Float = np.arctan2(a[0] * b[1] - a[1] * b[0], (a * b).sum(axis=0))
+        return turns
 
     def rate(self, z: State) -> float:
         """The fastest turn of a link, rad per time."""
@@ -162,7 +164,7 @@ class FreeRod:
         """The state after a step h; LinAlgError if Newton's method does not converge."""
         return State(*self.step(z.r, z.v, h), *self.twist(z.theta, z.omega, h))
 
-    def step(self, r: NDArray, v: NDArray, h: float) -> tuple[NDArray, NDArray]:
+    def step(self, r: Float, v: Float, h: float) -> tuple[Float, Float]:
         """Places and velocities after a step h; LinAlgError if Newton's method does not converge."""
         n, d, bent = r.shape[1], self.links(r), self.bent(r)
         u, mu = h * v, np.zeros(self.length.size)
@@ -179,7 +181,7 @@ class FreeRod:
                 return moved, self.admissible(moved, u / h - 0.5 * h * (bent + 0.5 * self.bent(u)) / self._mass)
         raise LinAlgError("Newton's method does not converge")
 
-    def twist(self, theta: NDArray, omega: NDArray, h: float) -> tuple[NDArray, NDArray]:
+    def twist(self, theta: Float, omega: Float, h: float) -> tuple[Float, Float]:
         """theta and omega after a step h of the midpoint rule, which owes nothing to the centre line."""
         still, entries = np.zeros_like(theta), np.concatenate([0.25 * h * h * self._twists, self._spin])
         mean = self._roll(entries, self._spin * omega - 0.5 * h * self.gradient(still, still, theta)[2])

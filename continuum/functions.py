@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -10,8 +10,17 @@ from numpy.typing import NDArray
 
 from continuum.density import Density
 from continuum.elements import lobatto
+from discs.arrays import Float
 
 FINER = 1.5  # points a node: products of three polynomials are integrated exactly
+
+Coefficients: TypeAlias = NDArray[np.floating]  # of polynomials, as NumPy's stubs have them
+
+
+class Derivatives(Protocol):
+    """The matrix (S, n) from values at the nodes to the m-th derivatives of a field at places s (S,); m = 0, 1, 2."""
+
+    def __call__(self, s: Float, m: int = 0, /) -> Float: ...
 
 
 class Functions(NamedTuple):
@@ -24,23 +33,23 @@ class Functions(NamedTuple):
     project : (n, F + n), f'' at the finer points and f at the nodes to the coefficients of P f.
     bending : (n,), int |r''|^2 is the sum of this times |coefficient|^2. torsion : (n, n), of int theta'^2.
     line : places (S,) to the matrix (S, n) that takes coefficients there.
-    field : places (S,) and m = 0, 1, 2 to the matrix (S, n) that takes values at the nodes to the field's m-th derivatives there.
+    field : see `Derivatives`.
     ends : how many of the first coefficients are r at the ends.
     """
 
-    s: NDArray
-    w: NDArray
-    bends: NDArray
-    rates: NDArray
-    project: NDArray
-    bending: NDArray
-    torsion: NDArray
-    line: Callable[[NDArray], NDArray]
-    field: Callable[..., NDArray]
+    s: Float
+    w: Float
+    bends: Float
+    rates: Float
+    project: Float
+    bending: Float
+    torsion: Float
+    line: Callable[[Float], Float]
+    field: Derivatives
     ends: int
 
 
-def smooth(order: NDArray) -> NDArray:
+def smooth(order: Float) -> Float:
     """Factors that leave the highest functions out of headings, for order/highest in [0, 1]: exp(-36 order^16).
 
     A line that moves by r. = i R omega r' alone moves like the Cauchy-Riemann equations: a wave of number q grows at the
@@ -73,17 +82,17 @@ def polynomials(n: int, density: Density) -> Functions:
     to_legendre = np.linalg.inv(legendre.legvander(lobatto(n - 1)[0], n - 1))
     derivatives = [legendre.legder(to_legendre, m) for m in range(3)]
 
-    def value(xi: NDArray, functions: NDArray) -> NDArray:
-        return legendre.legvander(xi, len(functions) - 1) @ functions
+    def value(xi: Float, functions: Coefficients) -> Float:
+        return (legendre.legvander(xi, len(functions) - 1) @ functions).astype(np.float64, copy=False)
 
-    def line(s: NDArray) -> NDArray:
+    def line(s: Float) -> Float:
         return np.column_stack([1 - s / length, s / length, value(density.coordinate(s), zeroth) - np.outer(s, tilt)])
 
-    def slope(xi: NDArray) -> NDArray:
+    def slope(xi: Float) -> Float:
         ends = np.full(xi.size, 1 / length)
         return np.column_stack([-ends, ends, value(xi, first) - tilt])
 
-    def field(s: NDArray, m: int = 0) -> NDArray:
+    def field(s: Float, m: int = 0) -> Float:
         xi = density.coordinate(s)
         found = value(xi, derivatives[m]) * density.rate(s)[:, None] ** m
         return found if m < 2 else found + value(xi, derivatives[1]) * density.change(s)[:, None]
@@ -119,12 +128,12 @@ def polynomials(n: int, density: Density) -> Functions:
 def waves(n: int, density: Density) -> Functions:
     """The first n (odd) of 1, cos, sin, ... on a closed rod; coefficients of r are those of the series."""
     length = density.length
-    q = 2 * np.pi / length * np.repeat(np.arange(1, n // 2 + 1), 2)
+    q = 2 * np.pi / length * np.repeat(np.arange(1.0, n // 2 + 1), 2)
     phase = np.tile([0.0, -np.pi / 2], n // 2)
-    s, count = length / n * np.arange(n), int(np.ceil(FINER * n))
-    fine = length / count * np.arange(count)
+    s, count = length / n * np.arange(float(n)), int(np.ceil(FINER * n))
+    fine = length / count * np.arange(float(count))
 
-    def value(s: NDArray, m: int = 0) -> NDArray:
+    def value(s: Float, m: int = 0) -> Float:
         """The m-th derivatives at s, (S, n)."""
         return np.column_stack([np.full(s.size, m == 0), q**m * np.cos(np.outer(s, q) + phase + m * np.pi / 2)])
 

@@ -29,15 +29,16 @@ is the mean of the initial one with the node's function.
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from continuum.density import Density
 from continuum.functions import polynomials, waves
 from continuum.initial import Resolved, resolve
+from continuum.kernels.spectral import Spectral
 from continuum.rod import Scene
+from discs.arrays import Complex, Float
 from discs.chains.rolling import ROLLING
 from discs.skew import Phase, SkewGradient
 
@@ -47,18 +48,18 @@ DATA = 24  # points of a piece of the initial fields, besides those for the func
 class Modes(NamedTuple):
     """The eigenvectors of C^T (grad^2 V) C at a configuration: values (n,), vectors (n, n) in columns, back their transpose."""
 
-    values: NDArray
-    vectors: NDArray
-    back: NDArray
+    values: Float
+    vectors: Float
+    back: Float
 
 
 class Basis(NamedTuple):
     """C at a configuration (or several, with one more axis before): e (n,) and t = 1/sqrt(w (alpha + rho |e|^2)) at the nodes; e'',
     2 e', e (3, F) at the finer points."""
 
-    e: NDArray
-    t: NDArray
-    finer: NDArray
+    e: Complex
+    t: Float
+    finer: Complex
 
 
 class SpectralRod(SkewGradient):
@@ -96,10 +97,8 @@ class SpectralRod(SkewGradient):
         self.start = self._start(resolve(scene))
 
     @cached_property
-    def parameters(self) -> Any:
+    def parameters(self) -> Spectral:
         """The parameters for the compiled form of steps, which are still to be given modes."""
-        from continuum.kernels.spectral import Spectral
-
         return Spectral(
             bends=self._bends,
             rates=self._rates,
@@ -119,7 +118,7 @@ class SpectralRod(SkewGradient):
         )
 
     @cached_property
-    def line(self) -> NDArray:
+    def line(self) -> Float:
         """Coefficients of r to its values at the nodes, (n, n)."""
         return self.functions.line(self.functions.s)
 
@@ -145,12 +144,12 @@ class SpectralRod(SkewGradient):
         self._offset = initial.energy - self.energy(start)
         return start
 
-    def slopes(self, z: Phase) -> NDArray:
+    def slopes(self, z: Phase) -> Complex:
         """r' at the nodes, (..., n), as a complex number."""
         xy = (z.hi + z.lo)[..., :2, :] @ self.functions.bends[: self.n].T
         return xy[..., 0, :] + 1j * xy[..., 1, :] + self._shift
 
-    def _omega(self, z: Phase) -> NDArray:
+    def _omega(self, z: Phase) -> Float:
         """omega at the nodes, (..., n); as `basis` has it, without the finer points."""
         e = self._radius * self.law.size(np.abs(self.slopes(z)))
         return z.pi / np.sqrt(self._spin + self._mass * e**2)
@@ -159,40 +158,43 @@ class SpectralRod(SkewGradient):
         """Kinetic and potential energy."""
         return float(self.energies(z))
 
-    def energies(self, z: Phase) -> NDArray:
+    def energies(self, z: Phase) -> Float:
         """Those of several states at once, by leading axes."""
-        return 0.5 * (z.pi * z.pi).sum(axis=-1) + self._potentials(z.hi + z.lo)
+        kinetic: Float = 0.5 * (z.pi * z.pi).sum(axis=-1)
+        return kinetic + self._potentials(z.hi + z.lo)
 
-    def _potentials(self, q: NDArray) -> NDArray:
-        return 0.5 * ((q * self.mean_force(q)).sum(axis=(-2, -1)) + q[..., 2, :] @ self.twist) + self._offset
+    def _potentials(self, q: Float) -> Float:
+        twice: Float = (q * self.mean_force(q)).sum(axis=(-2, -1)) + q[..., 2, :] @ self.twist
+        return 0.5 * twice + self._offset
 
-    def reader(self, s: NDArray) -> Callable[[Phase], dict[str, NDArray]]:
+    def reader(self, s: Float) -> Callable[[Phase], dict[str, Float]]:
         """A function of states, several at once by leading axes, that returns x, y, theta, omega at places s, each (..., S)."""
         line, field, theta = self.functions.line(s), self.functions.field(s), self._scene.fields(s)["theta"]
 
-        def at(z: Phase) -> dict[str, NDArray]:
+        def at(z: Phase) -> dict[str, Float]:
             q = z.hi + z.lo
             x, y = q[..., 0, :] @ line.T + self._shift.real * s, q[..., 1, :] @ line.T + self._shift.imag * s
             return {"x": x, "y": y, "theta": theta + q[..., 2, :] @ field.T, "omega": self._omega(z) @ field.T}
 
         return at
 
-    def slip(self, z: Phase) -> NDArray:
+    def slip(self, z: Phase) -> Float:
         """Largest |r. - e omega| at the nodes: what the projection leaves of the constraint; several at once by leading axes."""
         c = self.basis(z.hi + z.lo)
         rates = self.forward(c, z.pi)
         moved = (rates[..., 0, :] + 1j * rates[..., 1, :]) @ self.line.T
-        return np.abs(moved - c.e * rates[..., 2, :]).max(axis=-1)
+        slip: Float = np.abs(moved - c.e * rates[..., 2, :]).max(axis=-1)
+        return slip
 
-    def shape(self, hi: NDArray, lo: NDArray | None = None) -> NDArray:
+    def shape(self, hi: Float, lo: Float | None = None) -> Float:
         return hi if lo is None else hi + lo
 
-    def moved(self, shape: NDArray, dq: NDArray) -> NDArray:
+    def moved(self, shape: Float, dq: Float) -> Float:
         return shape + dq
 
     # All of these take several configurations at once, by leading axes
 
-    def basis(self, shape: NDArray) -> Basis:
+    def basis(self, shape: Float) -> Basis:
         xy = shape[..., :2, :] @ self._bends
         z = xy[..., 0, :] + 1j * xy[..., 1, :]
         n, f = self.n, self.functions.project.shape[1] - self.n
@@ -203,7 +205,7 @@ class SpectralRod(SkewGradient):
         t = 1 / np.sqrt(self._spin + self._mass * (e.real**2 + e.imag**2))
         return Basis(e, t, 1j * self._radius * fine)
 
-    def forward(self, c: Basis, p: NDArray) -> NDArray:
+    def forward(self, c: Basis, p: Float) -> Float:
         omega = c.t * p
         rates = (omega @ self._rates).reshape(*omega.shape[:-1], 3, -1)
         moves = np.concatenate([(c.finer * rates).sum(axis=-2), c.e * omega], axis=-1)
@@ -212,28 +214,28 @@ class SpectralRod(SkewGradient):
         out[..., 2, :] = omega
         return out
 
-    def back(self, c: Basis, g: NDArray) -> NDArray:
+    def back(self, c: Basis, g: Float) -> Float:
         pull = g[..., :2, :] @ self.functions.project
         pull = pull[..., 0, :] - 1j * pull[..., 1, :]
         fine = (c.finer * pull[..., None, : -self.n]).real
         return c.t * (fine.reshape(*g.shape[:-2], -1) @ self.functions.rates + (c.e * pull[..., -self.n :]).real + g[..., 2, :])
 
-    def bases(self, shape: NDArray, moves: NDArray) -> Basis:
+    def bases(self, shape: Float, moves: Float) -> Basis:
         return self.basis(shape + moves)
 
-    def forwards(self, bases: Basis, p: NDArray) -> NDArray:
+    def forwards(self, bases: Basis, p: Float) -> Float:
         return self.forward(bases, p)
 
-    def pulls(self, bases: Basis, shape: NDArray, t: NDArray, z: Phase, moves: NDArray, p: NDArray) -> NDArray:
+    def pulls(self, bases: Basis, shape: Float, t: Float, z: Phase, moves: Float, p: Float) -> Float:
         return self.back(bases, self.mean_force(shape + moves))
 
-    def potential(self, shape: NDArray) -> float:
+    def potential(self, shape: Float) -> float:
         return float(self._potentials(shape))
 
-    def secant(self, shape: NDArray, dq: NDArray) -> NDArray:
+    def secant(self, shape: Float, dq: Float) -> Float:
         return shape + 0.5 * dq
 
-    def mean_force(self, secant: NDArray) -> NDArray:
+    def mean_force(self, secant: Float) -> Float:
         out = secant * self.bending
         out[..., 2, :] = secant[..., 2, :] @ self.torsion + self.twist
         return out
@@ -249,6 +251,6 @@ class SpectralRod(SkewGradient):
         values, vectors = np.linalg.eigh(c.t[:, None] * (bent + self.torsion) * c.t)
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 
-    def solve(self, secant: NDArray, c: Basis, g: complex, rhs: NDArray, d: complex = 0.0) -> NDArray:
+    def solve(self, secant: Float, c: Basis, g: complex, rhs: Float, d: complex = 0.0) -> Float:
         values, vectors, back = self.modes(c)
         return vectors @ ((back @ rhs) / (1 + g * values))

@@ -26,10 +26,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from continuum.pieces import ENDS, NODES, POINTS, TINY, WEIGHTS, Cut, Data, split
 from continuum.rod import Scene, SteeredRod
+from discs.arrays import Float
 from discs.chains.links import CURVATURE
 from discs.chains.rolling import ROLLING
 
@@ -54,17 +54,17 @@ class Resolved:
     """
 
     scene: Scene
-    pieces: NDArray
+    pieces: Float
     energy: float
     potential: float
     features: tuple[tuple[float, float], ...] = ()
     kinks: tuple[float, ...] = ()
 
-    def fields(self, s: NDArray) -> dict[str, NDArray]:
+    def fields(self, s: Float) -> dict[str, Float]:
         """The initial fields at places (n,) by name, each (n,)."""
         return self.scene.fields(s)
 
-    def quadrature(self, order: int) -> tuple[NDArray, NDArray]:
+    def quadrature(self, order: int) -> tuple[Float, Float]:
         """Places and weights of Gauss's rule with `order` points on every piece, each (P order,)."""
         x, w = legendre.leggauss(order)
         half = np.diff(self.pieces)[:, None] / 2
@@ -107,7 +107,7 @@ def _resolve(scene: Scene) -> Resolved:
     return Resolved(scene, cut.edges, float(energies.sum()), float(parts[1].sum()), _features(data, cut), _kinks(data, cut))
 
 
-def _seam(data: Data) -> NDArray:
+def _seam(data: Data) -> Float:
     """What the fields of a closed scene gain around it, (F,)."""
     gains = {"x": data.scene.shift[0], "y": data.scene.shift[1], "phi": 2 * np.pi * data.scene.turns}
     return np.array([gains.get(name, 0.0) for name in data.names])
@@ -144,7 +144,7 @@ def _check_jumps(data: Data, cut: Cut) -> None:
             _check_heading(data, cut)
 
 
-def _check_jump(data: Data, jumps: NDArray, limit: NDArray, places: NDArray) -> None:
+def _check_jump(data: Data, jumps: Float, limit: Float, places: Float) -> None:
     """Refuse jumps (F, places) beyond the limit."""
     beyond = np.abs(jumps) > limit
     if not beyond.any():
@@ -158,7 +158,7 @@ def _check_jump(data: Data, jumps: NDArray, limit: NDArray, places: NDArray) -> 
     )
 
 
-def _turns(data: Data, cut: Cut) -> tuple[NDArray, NDArray, NDArray]:
+def _turns(data: Data, cut: Cut) -> tuple[Float, Float, Float]:
     """Jumps of slopes (F, places) that are more than errors (0 where not), at the places, and the largest slopes (F,)."""
     slope, width = cut.at(ENDS, 1) + data.chord[:, None, None], cut.width
     jumps, near, places = slope[:, 1:, 0] - slope[:, :-1, 1], np.minimum(width[1:], width[:-1]), cut.edges[1:-1]
@@ -205,7 +205,7 @@ def _kinks(data: Data, cut: Cut) -> tuple[float, ...]:
     return tuple(places[(jumps != 0).any(axis=0)].tolist())
 
 
-def _energies(data: Data, cut: Cut) -> NDArray:
+def _energies(data: Data, cut: Cut) -> Float:
     """Kinetic and potential energy of every piece, (2, P); `Rod` has the densities."""
     scene, rod = data.scene, data.scene.rod
     value, slope, bend = (dict(zip(data.names, cut.at(NODES, d), strict=True)) for d in range(3))
@@ -221,7 +221,7 @@ def _energies(data: Data, cut: Cut) -> NDArray:
         kinetic = (rod.spin_inertia + rod.density * e**2) * value["omega"] ** 2
         density = CURVATURE[rod.curvature].density(rod.bending_stiffness, rod.stretch_stiffness, z, z1)
     density += rod.torsion_stiffness * slope["theta"] ** 2
-    energies: NDArray = cut.width / 4 * (np.stack([kinetic, density]) @ WEIGHTS)
+    energies: Float = cut.width / 4 * (np.stack([kinetic, density]) @ WEIGHTS)
     return energies
 
 

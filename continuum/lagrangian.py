@@ -28,16 +28,16 @@ A^alpha_a (dy^a - y^a_mu dx^mu) ^ d^n x_0 of (bundleF) is along a section, times
 (NHnoether); elsewhere this is the nonholonomic momentum equation.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import sympy as sy
 from sympy.core.function import AppliedUndef
 
-Generator = Mapping[Any, Any]
+Generator = Mapping[sy.Expr, sy.Expr]  # by coordinate and field
 
 
 def _simple(expression: sy.Expr) -> sy.Expr:
@@ -81,9 +81,9 @@ class FieldTheory:
     ValueError : for fields of different coordinates, derivatives of too high an order, or dependent constraints.
     """
 
-    lagrangian: Any
-    fields: tuple[Any, ...]
-    constraints: tuple[Any, ...] = ()
+    lagrangian: sy.Expr
+    fields: Sequence[AppliedUndef]
+    constraints: Sequence[sy.Expr] = ()
 
     def __post_init__(self) -> None:
         for name in ("fields", "constraints"):
@@ -106,7 +106,7 @@ class FieldTheory:
         if not self.fields or any(y.args != self.fields[0].args for y in self.fields):
             raise ValueError(f"fields must depend on the same coordinates in the same order; got {self.fields}")
 
-    def _expression(self, name: str, value: Any, order: int) -> sy.Expr:
+    def _expression(self, name: str, value: object, order: int) -> sy.Expr:
         try:
             expression = sy.sympify(value).doit()
         except (sy.SympifyError, AttributeError):
@@ -119,7 +119,8 @@ class FieldTheory:
     @property
     def coordinates(self) -> tuple[sy.Symbol, ...]:
         """x^mu, time first."""
-        return self.fields[0].args
+        coordinates: tuple[sy.Symbol, ...] = self.fields[0].args
+        return coordinates
 
     @property
     def rates(self) -> tuple[sy.Expr, ...]:

@@ -9,16 +9,19 @@ Newton's method with exact derivatives in sparse matrices, or by one linear solv
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 import sympy as sy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
 from continuum.cells import CellTheory, Part, Point, i, points
 from discs import checks
+from discs.arrays import Float, Int
+
+_Compiled: TypeAlias = Callable[..., list[Float | float]]  # of the arguments (cells,), each expression
 
 
 class Path(NamedTuple):
@@ -30,15 +33,15 @@ class Path(NamedTuple):
     multipliers : (F-2, C), lambda at levels 1, ..., F-2; constraint after constraint, each over its nodes.
     """
 
-    values: NDArray
-    multipliers: NDArray
+    values: Float
+    multipliers: Float
 
 
 class _Place(NamedTuple):
     """Where an argument stands in u = (q_{n-1}, q_n, q_{n+1}, lambda), flat, for each cell; and what to add on further turns."""
 
-    at: NDArray
-    jump: NDArray | float = 0.0
+    at: Int
+    jump: Float | float = 0.0
 
 
 class _Term:
@@ -53,7 +56,7 @@ class _Term:
     """
 
     def __init__(
-        self, cells: NDArray, expressions: Sequence[tuple[sy.Expr, NDArray]], arguments: Mapping[sy.Expr, _Place], known: int
+        self, cells: Int, expressions: Sequence[tuple[sy.Expr, Int]], arguments: Mapping[sy.Expr, _Place], known: int
     ) -> None:
         self._cells = cells
         self._index = np.array([place.at for place in arguments.values()], dtype=int)
@@ -68,21 +71,22 @@ class _Term:
         self._slopes = self._compiled([entry[0] for entry in slopes], arguments)
 
     @staticmethod
-    def _compiled(expressions: Sequence[sy.Expr], arguments: Mapping[sy.Expr, _Place]) -> Callable[..., Any]:
+    def _compiled(expressions: Sequence[sy.Expr], arguments: Mapping[sy.Expr, _Place]) -> _Compiled:
         names = {a: sy.Dummy() for a in arguments}
-        return sy.lambdify([*names.values(), i], [e.xreplace(names) for e in expressions], "numpy", cse=True)
+        compiled: _Compiled = sy.lambdify([*names.values(), i], [e.xreplace(names) for e in expressions], "numpy", cse=True)
+        return compiled
 
-    def _evaluate(self, function: Callable[..., Any], u: NDArray, count: int) -> NDArray:
+    def _evaluate(self, function: _Compiled, u: Float, count: int) -> Float:
         result = np.empty((count, self._cells.size))
         for row, value in zip(result, function(*(u[self._index] + self._jump), self._cells), strict=True):
             row[:] = value
         return result
 
-    def values(self, u: NDArray) -> NDArray:
+    def values(self, u: Float) -> Float:
         """The expressions, (expressions, cells)."""
         return self._evaluate(self._values, u, len(self.rows))
 
-    def slopes(self, u: NDArray) -> NDArray:
+    def slopes(self, u: Float) -> Float:
         """Their derivatives by unknowns, those that are not 0 everywhere, (slopes, cells)."""
         return self._evaluate(self._slopes, u, len(self.pattern))
 
@@ -110,7 +114,7 @@ class Lattice:
     """
 
     def __init__(
-        self, theory: CellTheory, nodes: int, values: Mapping[Any, float], *, closed: bool = False, shift: ArrayLike = 0.0
+        self, theory: CellTheory, nodes: int, values: Mapping[sy.Symbol, float], *, closed: bool = False, shift: ArrayLike = 0.0
     ) -> None:
         self.theory, self.closed = theory, closed
         self.nodes = checks.whole("nodes", nodes, 1)
@@ -138,7 +142,7 @@ class Lattice:
             raise ValueError(f"values must have a number for every symbol; missing: {', '.join(sorted(map(str, missing)))}")
         return plain
 
-    def _cells(self, part: Part, reached: Sequence[Point]) -> NDArray:
+    def _cells(self, part: Part, reached: Sequence[Point]) -> Int:
         """The nodes i of a part's cells, given the points it reaches."""
         every = np.arange(self.nodes)
         offsets = [0] if self.closed else [0, *(p.offset for p in reached)]
@@ -154,7 +158,7 @@ class Lattice:
             raise ValueError(f"cells must lie on the lattice of {self.nodes} nodes; {part.expression} at {part.cells} leaves it")
         return chosen
 
-    def _place(self, point: Point, cells: NDArray) -> _Place:
+    def _place(self, point: Point, cells: Int) -> _Place:
         """Where a point of cells stands in u."""
         field = self.theory.fields.index(point.field)
         turns, nodes = np.divmod(cells + point.offset, self.nodes)
@@ -201,18 +205,16 @@ class Lattice:
         pairs = list(pairwise(levels))
         return float(sum(term.values(np.concatenate([now, now, after])).sum() for now, after in pairs for term in self._densities))
 
-    def _residual(self, u: NDArray) -> NDArray:
+    def _residual(self, u: Float) -> Float:
         weights = np.concatenate([term.values(u).ravel() for term in self._terms])
-        return np.bincount(self._rows, weights, self._size + self.n_multipliers)
+        return np.bincount(self._rows, weights, self._size + self.n_multipliers).astype(np.float64, copy=False)
 
-    def _jacobian(self, u: NDArray) -> sp.csc_array:
+    def _jacobian(self, u: Float) -> sp.csc_array:
         """Derivatives of the residual by q_{n+1} and the multipliers."""
         entries = np.concatenate([term.slopes(u).ravel() for term in self._terms])
         return sp.csc_array((entries, tuple(self._pattern)), shape=(self._size + self.n_multipliers,) * 2)
 
-    def residual(
-        self, before: ArrayLike, now: ArrayLike, after: ArrayLike, multipliers: ArrayLike = 0.0
-    ) -> tuple[NDArray, NDArray]:
+    def residual(self, before: ArrayLike, now: ArrayLike, after: ArrayLike, multipliers: ArrayLike = 0.0) -> tuple[Float, Float]:
         """What a solution makes vanish: E_a - lambda_alpha Phi^alpha_a (fields, nodes) and phi_d (C,); (discNH).
 
         Parameters
@@ -223,12 +225,12 @@ class Lattice:
         whole = self._residual(self._stacked(before, now, after, multipliers))
         return whole[: self._size].reshape(-1, self.nodes), whole[self._size :]
 
-    def _stacked(self, before: ArrayLike, now: ArrayLike, after: ArrayLike, multipliers: ArrayLike) -> NDArray:
+    def _stacked(self, before: ArrayLike, now: ArrayLike, after: ArrayLike, multipliers: ArrayLike) -> Float:
         given = (("before", before), ("now", now), ("after", after))
         levels = [self._level(name, level).ravel() for name, level in given]
         return np.concatenate([*levels, checks.field("multipliers", multipliers, self.n_multipliers)])
 
-    def _level(self, name: str, given: ArrayLike) -> NDArray:
+    def _level(self, name: str, given: ArrayLike) -> Float:
         level, shape = checks.array(name, given), (len(self.theory.fields), self.nodes)
         if level.shape != shape or not np.isfinite(level).all():
             raise ValueError(f"{name} must be finite and of shape {shape}, fields and nodes; got shape {level.shape}")
@@ -236,7 +238,7 @@ class Lattice:
 
     def step(
         self, before: ArrayLike, now: ArrayLike, multipliers: ArrayLike = 0.0, *, tolerance: float = 1e-12, sweeps: int = 20
-    ) -> tuple[NDArray, NDArray]:
+    ) -> tuple[Float, Float]:
         """One level further: q_{n+1} (fields, nodes) and the multipliers (C,) at level n.
 
         Parameters

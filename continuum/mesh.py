@@ -1,7 +1,5 @@
 """The rod on a mesh: second-order finite differences in s, which read as rolling discs."""
 
-from typing import Any
-
 import numpy as np
 
 from continuum.initial import resolve
@@ -31,16 +29,15 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     if ends == "ring" and not scene.closed:
         raise ValueError("ends='ring' needs a closed scene; this one has two free ends: take 'springs' or 'consistent'")
     rod = scene.rod
-    common: dict[str, Any] = {
-        name: getattr(rod, name)
-        for name in ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness", "radius")
-    } | {"n": n, "ends": "ring" if scene.closed else ends, "shift": scene.shift}
+    names = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness", "radius")
+    common: dict[str, float] = {name: getattr(rod, name) for name in names}
+    ends = "ring" if scene.closed else ends
     chain: Chain | SteeredChain
     if isinstance(rod, SteeredRod):
-        beams: dict[str, Any] = {"shear_stiffness": rod.shear_stiffness, "heading_inertia": rod.heading_inertia}
-        chain = SteeredChain(**common, **beams, turns=scene.turns)
+        common |= {"shear_stiffness": rod.shear_stiffness, "heading_inertia": rod.heading_inertia}
+        chain = SteeredChain(n=n, ends=ends, shift=scene.shift, turns=scene.turns, **common)
     else:
-        chain = Chain(**common, rolling=scene.rolling, curvature=rod.curvature)
+        chain = Chain(n=n, ends=ends, shift=scene.shift, rolling=scene.rolling, curvature=rod.curvature, **common)
     return Problem(chain, State(**scene.fields(chain.s)), scene.duration)
 
 
@@ -69,8 +66,9 @@ def unseen(scene: Scene, problem: Problem) -> str:
     for name, moment in inertia.items():
         value, period = fields[name], scene.rod.length if scene.closed else None
         between = np.interp(s, problem.chain.s, np.asarray(getattr(problem.initial, name)), period=period)
-        whole = value - (w @ value) / scene.rod.length
-        parts[f"kinetic energy of {name}"] = (0.5 * moment * w @ (value - between) ** 2, 0.5 * moment * w @ whole**2)
+        about = value - (w @ value) / scene.rod.length
+        lost, whole = (float(0.5 * moment * w @ part**2) for part in (value - between, about))
+        parts[f"kinetic energy of {name}"] = lost, whole
     missed = [name for name, (lost, whole) in parts.items() if lost > UNSEEN * whole and whole > 1e-6 * found.energy]
     if not missed:
         return ""

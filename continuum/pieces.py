@@ -5,9 +5,9 @@ from typing import NoReturn
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from continuum.rod import Scene
+from discs.arrays import Bool, Float, Int
 
 POINTS = 16  # Gauss nodes of a piece
 PROBES = 8192
@@ -45,7 +45,7 @@ class Data:
         self.rounding = 64 * EPS * np.maximum(np.abs(raw).max(axis=1), self.unit)
         self.allowed = SMALL * self.size + self.rounding
 
-    def read(self, s: NDArray) -> NDArray:
+    def read(self, s: Float) -> Float:
         """The fields at places (n,), x and y less the chord, (F, n)."""
         return np.stack(list(self.scene.fields(s).values())) - np.outer(self.chord, s)
 
@@ -69,14 +69,14 @@ class Cut:
     each (P,).
     """
 
-    edges: NDArray
-    c: NDArray
-    misfit: NDArray
-    lost: NDArray
-    worst: NDArray
+    edges: Float
+    c: Float
+    misfit: Float
+    lost: Bool
+    worst: Int
 
     @property
-    def width(self) -> NDArray:
+    def width(self) -> Float:
         return np.diff(self.edges)
 
     def breaks(self) -> list[float]:
@@ -88,16 +88,16 @@ class Cut:
         least = TINY * self.edges[-1]
         return [float(s) for s in middles if least < s < self.edges[-1] - least]
 
-    def at(self, x: NDArray, derivative: int = 0) -> NDArray:
+    def at(self, x: Float, derivative: int = 0) -> Float:
         """Fields, or derivatives by s, at places x (n,) of every piece, within [-1, 1]: (F, P, n)."""
         polynomials = legendre.legder(np.eye(self.c.shape[-1]), derivative) if derivative else np.eye(self.c.shape[-1])
         values = legendre.legvander(x, len(polynomials) - 1) @ polynomials
         return self.c @ values.T * (2 / self.width[:, None]) ** derivative
 
 
-def split(data: Data, edges: NDArray) -> Cut:
+def split(data: Data, edges: Float) -> Cut:
     """Bisect pieces until they are resolved, or too short to be cut."""
-    kept: list[tuple[NDArray, ...]] = []
+    kept: list[tuple[Float, Float, Float, Float, Bool, Int]] = []
     lo, hi = edges[:-1], edges[1:]
     before = np.full((len(data.size), lo.size), np.inf)  # misfit of the piece that was cut
     while lo.size:
@@ -135,14 +135,14 @@ def split(data: Data, edges: NDArray) -> Cut:
     return Cut(np.append(low[order], high.max()), np.moveaxis(coefficients[order], 0, 1), largest, lost[order], worst[order])
 
 
-def _in_both_halves(found: NDArray) -> NDArray:
+def _in_both_halves(found: Bool) -> Bool:
     """Where something is found (F, P) in a piece and in its other half, its neighbour in the list; False before any cut."""
     if found.shape[1] % 2:
         return np.zeros_like(found)
     return np.repeat(found[:, ::2] & found[:, 1::2], 2, axis=1)
 
 
-def _misfit_at_probes(data: Data, lo: NDArray, hi: NDArray, c: NDArray, which: NDArray) -> NDArray:
+def _misfit_at_probes(data: Data, lo: Float, hi: Float, c: Float, which: Bool) -> Float:
     """Largest misfit of every field at the probes in those pieces, (F, P); 0 in others and where no probe is."""
     worst = np.zeros(c.shape[:2])
     first, last = np.searchsorted(data.probes, lo), np.searchsorted(data.probes, hi)

@@ -5,7 +5,6 @@ from math import lcm
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from continuum.bounds import LEAST, missed, over
@@ -13,6 +12,7 @@ from continuum.elements import DEGREE, UNKNOWNS, Elements
 from continuum.initial import resolve
 from continuum.rod import Scene
 from discs import Solution
+from discs.arrays import Float
 
 RATES = ("omega", "phi_rate")
 MOST = 8.0  # times what more elements change: larger errors are not told from it
@@ -24,14 +24,14 @@ class Found(NamedTuple):
     """A motion on elements at times (F,): unknowns (F, 6, n)."""
 
     elements: Elements
-    q: NDArray
+    q: Float
 
-    def sample(self, places: int) -> NDArray:
+    def sample(self, places: int) -> Float:
         """The unknowns at equally spaced places, a multiple of the elements, (6, F, places)."""
         return np.stack([self.elements.sample(q, places // self.elements.count) for q in self.q], axis=1)
 
 
-def solve_elements(scene: Scene, bound: Mapping[str, float], times: NDArray, progress: bool) -> Solution:
+def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
     """The fields within bounds by name, their error measured on more elements.
 
     The first elements are as many as hold the initial fields: what is bound within its bound, other fields to a tenth. They are
@@ -56,7 +56,7 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: NDArray, pro
             f"take fields varying over length/{COUNTS[-1] // 4} = {4 * scene.rod.length / COUNTS[-1]:.2g} or more, or a larger tol"
         )
     runs: list[Found] = []
-    changes: list[NDArray] = []
+    changes: list[Float] = []
     with tqdm(desc=f"field to {min(bound.values()):g}", unit="run", delay=1, disable=not progress) as bar:
         for count in counts:
             system = Elements(scene, count)
@@ -89,14 +89,14 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: NDArray, pro
     )
 
 
-def falls(changes: NDArray, counts: Sequence[int], most: float) -> NDArray:
+def falls(changes: Float, counts: Sequence[int], most: float) -> Float:
     """Errors of the last count but one over its change, (6,), from two or three changes (m, 6) between counts (m + 1,).
 
     `most` is the largest order p.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         p = np.log(changes[0] / changes[-1]) / np.log(counts[-2] / counts[-len(changes) - 1])
-        factor = 1 / (1 - (counts[-2] / counts[-1]) ** np.clip(np.nan_to_num(p), 1e-3, most))
+        factor: Float = 1 / (1 - (counts[-2] / counts[-1]) ** np.clip(np.nan_to_num(p), 1e-3, most))
     return np.clip(factor, 1.5, MOST)
 
 

@@ -1,16 +1,16 @@
 """The rod: its parameters, and a scene that it moves in."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discs import checks
+from discs.arrays import Float
 from discs.chains import links
 from discs.chains.rolling import ROLLING
 
-Fields = Callable[[NDArray], tuple[NDArray, ...]]
+Fields = Callable[[Float], tuple[Float, ...]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +143,7 @@ class Scene:
         if self.turns and not (self.closed and self.steered):
             raise ValueError(f"turns belong to a closed rod with headings of its own; got turns={self.turns} of another")
 
-    def fields(self, s: NDArray) -> dict[str, NDArray]:
+    def fields(self, s: Float) -> dict[str, Float]:
         """The initial fields at places s (n,) by name, each (n,); ValueError if `initial` returns other than it should."""
         names = ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if self.steered else 4]
         places = s.copy()
@@ -154,6 +154,11 @@ class Scene:
             given = f"{len(values)} of them" if isinstance(values, tuple) else type(values).__name__
             raise ValueError(f"the scene's initial fields must be the tuple {', '.join(names)}; got {given}")
         return {name: checks.field(f"initial {name}", value, s.size) for name, value in zip(names, values, strict=True)}
+
+    def description(self) -> dict[str, object]:
+        """The scene without its initial fields, as numbers and words: `Solution.stats["scene"]`."""
+        names = ("name", "rolling", "duration", "closed", "shift", "turns")
+        return {name: getattr(self, name) for name in names} | asdict(self.rod)
 
     @property
     def steered(self) -> bool:

@@ -1,25 +1,32 @@
 """Named scenes. The rod's parameters are the paper's unless given by keyword."""
 
 from functools import partial
-from typing import Any
+from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from continuum.rod import Rod, Scene, SteeredRod
 from discs import checks
-from discs.chains.twist import PAPER, twisted
+from discs.arrays import Float
+from discs.chains.twist import PAPER, Parameters, twisted
 
 LAW = ("curvature", "stretch_stiffness")
 
 
-def _rod(given: dict[str, Any]) -> Rod:
+class RodParameters(Parameters, total=False):
+    """Parameters of a `Rod`, any of them."""
+
+    curvature: str
+    stretch_stiffness: float
+
+
+def _rod(given: RodParameters) -> Rod:
     for name in given:
         checks.choice("rod parameter", name, (*PAPER, *LAW))
     return Rod(**(PAPER | given))
 
 
-def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: Any) -> Scene:
+def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: Unpack[RodParameters]) -> Scene:
     """The paper's scene: a straight rod at rest, twisted by theta = -pi twist cos(pi s/length), let go.
 
     `twist` is the number of turns between the two ends, the paper's value 1/2. E(0) = beta pi**4 twist**2/(4 length), which
@@ -37,7 +44,7 @@ def steered_rod(
     heading_inertia: float = 0.25,
     duration: float = 4.5,
     twist: float = 0.5,
-    **parameters: Any,
+    **parameters: Unpack[Parameters],
 ) -> Scene:
     """The paper's twist of a rod whose sections have headings of their own, phi = 0 at rest; see `SteeredRod`."""
     for name in parameters:
@@ -58,7 +65,7 @@ def rolling_rod(
     omega: float = 1.0,
     mode: int = 1,
     amplitude: float = 1e-6,
-    **parameters: Any,
+    **parameters: Unpack[RodParameters],
 ) -> Scene:
     """A straight rod, periodic up to a shift, that rolls sideways at the rate `omega`, slightly perturbed.
 
@@ -81,23 +88,23 @@ def rolling_rod(
     )
 
 
-def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float = 0.4, **parameters: Any) -> Scene:
+def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float = 0.4, **parameters: Unpack[RodParameters]) -> Scene:
     """A circle of circumference `length`, all discs rolling at the rate `omega`: towards the centre if it is positive."""
     rod = _rod(parameters)
     initial = partial(_circle, radius=rod.length / (2 * np.pi), omega=checks.number("omega", omega))
     return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, closed=True, name="breathing ring")
 
 
-def _steered(s: NDArray, length: float, amplitude: float) -> tuple[NDArray, ...]:
+def _steered(s: Float, length: float, amplitude: float) -> tuple[Float, ...]:
     return (*twisted(s, length, amplitude), 0 * s, 0 * s)
 
 
-def _rolling(s: NDArray, q: float, radius: float, omega: float, amplitude: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _rolling(s: Float, q: float, radius: float, omega: float, amplitude: float) -> tuple[Float, Float, Float, Float]:
     theta = amplitude * np.cos(q * s)
     return s, radius * theta, theta, np.full_like(s, omega)
 
 
-def _circle(s: NDArray, radius: float, omega: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _circle(s: Float, radius: float, omega: float) -> tuple[Float, Float, Float, Float]:
     angle = s / radius
     return radius * np.cos(angle), radius * np.sin(angle), 0 * s, np.full_like(s, omega)
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from tqdm import tqdm
 
@@ -15,8 +15,8 @@ from continuum.mesh import semidiscretise, unseen
 from continuum.refinement import solve_elements
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
-from continuum.told import tells_scene
 from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
+from discs.arrays import Float, Spline
 from discs.running.frames import frame_times
 from discs.warn import warn
 
@@ -26,7 +26,6 @@ MOST_STEPS = 25 * 2**12
 SLOWEST = 0.9  # ratio of changes from mesh to mesh: errors that fall slower are not told from it
 
 
-@tells_scene
 def solve(
     scene: Scene,
     tol: float | Mapping[str, float] = 1e-5,
@@ -93,7 +92,8 @@ def solve(
         want = ("modified_energy",) if problem.system.quadratic else ()
         if warning := unseen(scene, problem):
             warn(warning)
-        return simulate(problem, "leapfrog", dt=step, frames=frames, want=want, progress=progress)
+        run = simulate(problem, "leapfrog", dt=step, frames=frames, want=want, progress=progress)
+        return replace(run, stats=run.stats | {"scene": scene.description()})
     if n is not None or dt is not None:
         raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
     bound = bounds(tol, scene.steered)
@@ -101,10 +101,11 @@ def solve(
     solver = {"elements": solve_elements, "spectral": solve_spectral, "richardson": _richardson}[method]
     found = solver(scene, bound, times, progress)
     drift = float(np.abs(found.energy - energy).max())
-    return replace(found, error_estimate=(found.error_estimate or {}) | {"energy": drift})
+    stats = found.stats | {"scene": scene.description()}
+    return replace(found, error_estimate=(found.error_estimate or {}) | {"energy": drift}, stats=stats)
 
 
-def _richardson(scene: Scene, bound: Mapping[str, float], frames: NDArray, progress: bool) -> Solution:
+def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progress: bool) -> Solution:
     tol = min(bound.values())
     # sweeps stop well below the tolerance: what each step leaves adds up over the steps
     method = Suzuki4(Midpoint(tolerance=min(1e-10, 1e-5 * tol)))
@@ -183,9 +184,10 @@ def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:
     return replace(fine, energy=fine.energy + (fine.energy - coarse.energy) / 3, **changed)
 
 
-def spline(scene: Scene, s: NDArray, values: NDArray) -> CubicSpline:
+def spline(scene: Scene, s: Float, values: Float) -> Spline:
     """Cubic spline in s through values (F, n) that are periodic if the scene is closed; call it for (places, F)."""
-    if not scene.closed:
-        return CubicSpline(s, values.T)
-    around = np.append(s, scene.rod.length)
-    return CubicSpline(around, np.concatenate([values, values[:, :1]], axis=1).T, bc_type="periodic")
+    ends = "not-a-knot"
+    if scene.closed:
+        s, values, ends = np.append(s, scene.rod.length), np.concatenate([values, values[:, :1]], axis=1), "periodic"
+    through: Spline = CubicSpline(s, values.T, bc_type=ends)
+    return through

@@ -14,10 +14,9 @@ like a power in the end, of the steps like their third; of omega, whose waves ha
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from continuum.bounds import FIELDS, missed, over
@@ -27,6 +26,7 @@ from continuum.initial import resolve
 from continuum.rod import Scene
 from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
 from discs import SimulationError, Solution
+from discs.arrays import Float
 from discs.running.stats import Stats
 from discs.skew import Phase
 
@@ -74,7 +74,7 @@ class Motion(NamedTuple):
 
     rod: SpectralRod
     states: list[Phase]
-    fields: dict[str, NDArray]
+    fields: dict[str, Float]
     start: dict[str, float]
     n: int
     tolerance: float
@@ -95,7 +95,7 @@ class Course:
     s : (S,), where fields are given.
     """
 
-    def __init__(self, scene: Scene, times: NDArray, stages: int, compiled: bool = True) -> None:
+    def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool = True) -> None:
         self._scene, self._times, self._compiled, self.stages = scene, times, compiled, stages
         initial, length = resolve(scene), scene.rod.length
         narrowest = min((width for _, width in initial.features), default=length)
@@ -119,7 +119,7 @@ class Course:
         return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths))
 
 
-def distances(a: dict[str, NDArray], b: dict[str, NDArray]) -> dict[str, float]:
+def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
     """Largest difference of each field."""
     return {name: float(np.abs(a[name] - b[name]).max()) for name in FIELDS}
 
@@ -131,7 +131,7 @@ def bent_hint(scene: Scene) -> str:
     length = scene.rod.length
     d = 1e-4 * length
     curvature = 0.0
-    for places in (d * np.arange(4), length - d * np.arange(4)):
+    for places in (d * np.arange(4.0), length - d * np.arange(4.0)):
         fields = scene.fields(places)
         r = fields["x"] + 1j * fields["y"]
         slope, bend = (-3 * r[0] + 4 * r[1] - r[2]) / (2 * d), (2 * r[0] - 5 * r[1] + 4 * r[2] - r[3]) / d**2  # to d^2
@@ -154,7 +154,7 @@ class Search:
     estimate : of the errors of the last motion that was measured, by field.
     """
 
-    def __init__(self, scene: Scene, bound: Mapping[str, float], times: NDArray, bar: tqdm) -> None:
+    def __init__(self, scene: Scene, bound: Mapping[str, float], times: Float, bar: tqdm) -> None:
         self._bound, self._bar = bound, bar
         tol = min(bound.values())
         narrow = bool(resolve(scene).features)
@@ -221,7 +221,7 @@ class Search:
         return over(self.estimate, self._bound) <= 1
 
 
-def solve_spectral(scene: Scene, bound: Mapping[str, float], times: NDArray, progress: bool) -> Solution:
+def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
     """The fields of a scene with slaved headings at `times` (F,), within the bounds by name; see `continuum.solve`."""
     with (
         tqdm(desc=f"field to {min(bound.values()):g}", unit="run", delay=1, disable=not progress) as bar,
@@ -244,5 +244,5 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: NDArray, pro
         "steps": found.steps,
     }
     energy, slip = (np.concatenate([f(z) for z in found.states]) for f in (found.rod.energies, found.rod.slip))
-    fields: dict[str, Any] = found.fields | {"energy": energy, "rolling_residual": slip}
-    return Solution(t=times, s=search.course.s, error_estimate=estimate, stats=stats, **fields)
+    x, y, theta, omega = (found.fields[name] for name in FIELDS)
+    return Solution(times, search.course.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate)

@@ -18,11 +18,11 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from continuum import collocation
 from continuum.galerkin import Modes, SpectralRod
 from discs import SimulationError
+from discs.arrays import Complex, Float
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Phase
 
@@ -45,7 +45,7 @@ def stages_for(tol: float) -> int:
 
 def finer(tolerance: float, stages: int) -> float:
     """A tolerance for which steps are about 1.5 times shorter, by their order s/2; errors of order 3 then fall to a third."""
-    return tolerance / min(1.5 ** (stages / 2 + 1), 8.0)
+    return tolerance / min(float(1.5 ** (stages / 2 + 1)), 8.0)
 
 
 def coarser(tolerance: float, stages: int) -> float:
@@ -90,7 +90,7 @@ class Steps:
         self._usual, self._excess = 0, 0  # sweeps of a step with its own modes; how many more it took since
         self.lengths: list[float] = []
 
-    def at(self, times: NDArray) -> Iterator[Phase]:
+    def at(self, times: Float) -> Iterator[Phase]:
         """The states at times (F,), increasing, some at once: arrays have one more axis before their own."""
         t, z = 0.0, self.rod.start
         while times.size:
@@ -106,7 +106,7 @@ class Steps:
                     yield collocation.within(start, t - before, v, p, (some - before) / (t - before))
             times = times[inside.size :]
 
-    def _step(self, t: float, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
+    def _step(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:
         """As `collocation.step`: with the modes of an earlier step as long as they save more than they cost."""
         fresh = self._modes is None or self._excess > MODES * self.rod.n / self._stages
         while True:
@@ -122,11 +122,11 @@ class Steps:
                 return after, v, p, taken
             fresh = True
 
-    def _sweep(self, t: float, z: Phase, h: float) -> tuple[Phase, NDArray, NDArray, int]:
+    def _sweep(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:
         assert self._modes is not None
         return collocation.step(self.rod, z, self._modes, t, h, self._stages, SWEEPS, self._sweeps, self._compiled)
 
-    def _advance(self, t: float, z: Phase) -> tuple[float, Phase, NDArray, NDArray]:
+    def _advance(self, t: float, z: Phase) -> tuple[float, Phase, Float, Float]:
         """One step from z at t that converges and is within the tolerance, and the rates and momenta of its stages."""
         slopes = self._slopes(z)
         while True:
@@ -149,7 +149,7 @@ class Steps:
             self.lengths.append(h)
             return (self._duration if h == left else t + h), after, v, p
 
-    def _turned(self, slopes: NDArray, after: Phase) -> bool:
+    def _turned(self, slopes: Complex, after: Phase) -> bool:
         """Whether a heading may have been lost within a step, from slopes (n,) before it."""
         if not self.rod.law.vanishing:
             return False
@@ -157,19 +157,19 @@ class Steps:
         now, then = (z[:-1] + part * np.diff(z) for z in (slopes, self._slopes(after)))
         return bool(((now.conj() * then).real < 0.5 * np.abs(now) ** 2).any())
 
-    def _slopes(self, z: Phase) -> NDArray:
+    def _slopes(self, z: Phase) -> Complex:
         """r' at the nodes; around a closed rod, to the first again."""
         slopes = self.rod.slopes(z)
         return np.append(slopes, slopes[0]) if self.rod.closed else slopes
 
-    def _error(self, v: NDArray, h: float) -> float:
+    def _error(self, v: Float, h: float) -> float:
         """Size of the highest coefficient in time of x, y, theta; of the last but one where that is far larger."""
         degrees = 2 * np.array([self._stages - 2, self._stages - 1]) + 1
         q = h / 2 * np.tensordot(self._series, v, 1) / degrees[:, None, None]
         sizes = np.maximum(np.abs(q[:, :2] @ self.rod.line.T).max(axis=(1, 2)), np.abs(q[:, 2]).max(axis=1))
         return float(max(sizes[1], 0.03 * sizes[0]))
 
-    def _check_heading(self, slopes: NDArray, t: float) -> None:
+    def _check_heading(self, slopes: Complex, t: float) -> None:
         least = np.abs(slopes[:-1] + _nearest(slopes) * np.diff(slopes))
         node = int(np.argmin(least))
         if self.rod.law.vanishing and not least[node] > LOST_HEADING:
@@ -194,7 +194,8 @@ class Steps:
         return TooFast("steps do not converge, however short: the motion is too fast for them", len(self.lengths), t, 0)
 
 
-def _nearest(slopes: NDArray) -> NDArray:
+def _nearest(slopes: Complex) -> Float:
     """Where r' is nearest to zero on the straight way from each node to the next, in [0, 1], (n - 1,)."""
     move = np.diff(slopes)
-    return np.clip(-(slopes[:-1].conj() * move).real / np.maximum(np.abs(move) ** 2, 1e-300), 0.0, 1.0)
+    part: Float = -(slopes[:-1].conj() * move).real / np.maximum(np.abs(move) ** 2, 1e-300)
+    return np.clip(part, 0.0, 1.0)

@@ -2,17 +2,16 @@
 
 from typing import NamedTuple
 
-from numpy.typing import NDArray
-
+from discs.arrays import Float
 from discs.kernels.compiled import part
 
 
 class History(NamedTuple):
     """The last three sweeps: rates and their changes (3, s rows n), momenta (3, s n)."""
 
-    rates: NDArray
-    changes: NDArray
-    momenta: NDArray
+    rates: Float
+    changes: Float
+    momenta: Float
 
 
 @part

@@ -7,13 +7,14 @@ guides the sweeps of a step see `continuum.collocation`.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from continuum.kernels.mixing import History, mix
+from discs.arrays import Complex, Float
 from discs.integrators.collocation import spread, transform
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill
 from discs.kernels.shared import copy
+from discs.skew import Parameters
 
 
 class Spectral(NamedTuple):
@@ -24,20 +25,20 @@ class Spectral(NamedTuple):
     modes : `continuum.galerkin.Modes`, of a configuration not far away.
     """
 
-    bends: NDArray
-    rates: NDArray
-    back: NDArray
-    project: NDArray
-    pull: NDArray
-    bending: NDArray
-    torsion: NDArray
-    twist: NDArray
-    mass: NDArray
-    spin: NDArray
-    scale: NDArray
+    bends: Float
+    rates: Float
+    back: Float
+    project: Float
+    pull: Float
+    bending: Float
+    torsion: Float
+    twist: Float
+    mass: Float
+    spin: Float
+    scale: Float
     shift: complex
     radius: float
-    rolling: Any
+    rolling: Parameters
     modes: Any
 
 
@@ -48,14 +49,14 @@ class Stages(NamedTuple):
     xy : (2 s, n), rows x and y of each stage. line : (2 s, n + 3 F). omega : (s, n). rates : (s, 3 F). moves : (2 s, F + n).
     """
 
-    e: NDArray
-    t: NDArray
-    finer: NDArray
-    xy: NDArray
-    line: NDArray
-    omega: NDArray
-    rates: NDArray
-    moves: NDArray
+    e: Complex
+    t: Float
+    finer: Complex
+    xy: Float
+    line: Float
+    omega: Float
+    rates: Float
+    moves: Float
 
 
 class Room(NamedTuple):
@@ -65,10 +66,10 @@ class Room(NamedTuple):
     """
 
     c: Stages
-    z: NDArray
-    parts: NDArray
-    modal: NDArray
-    guess: NDArray
+    z: Complex
+    parts: Float
+    modal: Float
+    guess: Float
     history: History
 
 

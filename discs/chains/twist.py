@@ -1,6 +1,6 @@
 """The paper's twisted rod as a chain of discs: the default scene."""
 
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -10,7 +10,19 @@ from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import ROLLING
 from discs.problem import Problem, State
 
-PAPER = {
+
+class Parameters(TypedDict, total=False):
+    """Parameters of the rod, any of them."""
+
+    length: float
+    density: float
+    spin_inertia: float
+    torsion_stiffness: float
+    bending_stiffness: float
+    radius: float
+
+
+PAPER: Parameters = {
     "length": 4.0,
     "density": 1.0,
     "spin_inertia": 1.0,

@@ -102,7 +102,7 @@ def _radius(run: Solution) -> float | None:
 
 
 def _scene(run: Solution) -> dict[str, Any]:
-    """The scene of a field, see `continuum.told`; empty for discs."""
+    """The scene of a field, see `Scene.description` of `continuum.rod`; empty for discs."""
     scene = run.stats.get("scene")
     return scene if isinstance(scene, dict) else {}
 

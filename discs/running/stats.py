@@ -37,7 +37,7 @@ class Stats(TypedDict, total=False):
     lean: float  # largest lean angle of the wheels, of a peer, rad
 
     # of a field and of a single disc
-    scene: dict[str, Any]  # name, laws, duration and parameters, see `continuum.told`
+    scene: dict[str, Any]  # name, laws, duration and parameters: `Scene.description` of `continuum.rod`
     functions: int  # of a spectral basis
     elements: int
     nodes: int
