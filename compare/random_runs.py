@@ -1,12 +1,12 @@
-"""Whether runs to a tolerance keep it: random problems by `simulate(..., "auto")`, against steps that are much shorter.
+"""A test of tolerances: random problems by `simulate(..., "auto")`, compared with runs of much shorter steps.
 
 A problem is a random scene (`compare.random_scenes`) as a chain of 3 to 200 discs with any ends, or with true curvature, and a
-tolerance of 1e-2 to 1e-8; both log-uniform. It is held against "gauss8" with steps REFINED times shorter than the result's: eight
-times shorter than any of its search, or more. How far a run with half as many steps is from that is the reference's error. One that
-errs by more than a fifth of the tolerance is none.
+tolerance of 1e-2 to 1e-8; both are log-uniform. The reference is "gauss8" with steps REFINED times shorter than those of the
+result, which is eight times shorter than any step of its search, or more. The error of the reference is its difference from a run
+with half as many steps. A reference whose error is more than a fifth of the tolerance is not used.
 
-A refusal has to be true. That rounding is the limit the search itself shows. A lost heading is shown by "gauss8" with steps three
-times shorter than those that lost it: it has to lose one too, at the same time.
+A refusal must be justified. That rounding is the limit is shown by the search itself. A lost heading is checked by "gauss8" with
+steps three times shorter than those that lost it: a heading must be lost again, at the same time.
 """
 
 import time as clock
@@ -30,16 +30,17 @@ from discs.arrays import Float
 from discs.running.estimates import differences, sizes
 
 SIZES = 3, 200  # discs
-TRUE, TRUE_SIZE, TRUE_DURATION = 0.25, 12, 2.0  # of unit-law chains have true curvature; these run on the plain engine only
+TRUE = 0.25  # share of unit-law chains that have true curvature, with the following limits as they run on the plain engine only
+TRUE_SIZE, TRUE_DURATION = 12, 2.0
 REFINED = 24
-HIGH = 5.0  # times its error is an estimate at most, in nine of ten runs
-FEWEST = 25  # steps that a reference's are counted from, at least
-MOMENT = 1e-6  # a time in which nothing moves
-SAME = 0.01  # of its time: a heading lost so near is the same
+HIGH = 5.0  # largest ratio of estimate to error wanted in nine of ten runs
+FEWEST = 25  # least number of steps that REFINED multiplies
+MOMENT = 1e-6  # a duration in which nothing moves
+SAME = 0.01  # relative: headings lost at times as close as this are the same
 
 
 def random_problem(seed: int, index: int) -> tuple[Problem, float, Row]:
-    """Problem number `index` of a seed, its tolerance, and a row with what it is in words; the same on every machine."""
+    """Problem number `index` of a seed, its tolerance, and a row that describes it; the same on every machine."""
     drawn, rng = random_scene(seed, index), np.random.default_rng([seed, index, 2])
     scene, n = drawn.scene, int(np.exp(rng.uniform(np.log(SIZES[0]), np.log(SIZES[1] + 1))))
     ends = "springs" if scene.steered else str(rng.choice(["springs", "consistent", "paper"]))
@@ -50,19 +51,19 @@ def random_problem(seed: int, index: int) -> tuple[Problem, float, Row]:
         ends = "springs" if ends == "paper" else ends
     n, tol = max(n, 5 if scene.closed else 4 if ends == "consistent" else 3), float(f"{10 ** -rng.uniform(2, 8):.1e}")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # few discs do not see every scene
+        warnings.simplefilter("ignore")  # few discs do not resolve every scene
         problem = lump(scene, n, ends)
     words = f"{drawn.words}, N = {n}, {problem.chain.ends}"
     return problem, tol, Row(f"{seed}:{index}", drawn.kind, law, words, scene.duration, "simulate", tol, "")
 
 
 def examine(case: list[float]) -> list[Any]:
-    """The row of a case [seed, index, seconds]: called in other processes."""
+    """The row of a case [seed, index, seconds]; called in other processes."""
     problem, tol, row = random_problem(int(case[0]), int(case[1]))
     seconds, found = float(case[2]), None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for method in ("midpoint", "gauss6", "gauss8"):  # compiled or loaded before any time counts
+        for method in ("midpoint", "gauss6", "gauss8"):  # compile or load kernels before time is measured
             simulate(replace(problem, duration=MOMENT), method, MOMENT, 1, progress=False)
         begun = clock.process_time()
         try:
@@ -77,7 +78,7 @@ def examine(case: list[float]) -> list[Any]:
 
 
 def _judged(problem: Problem, found: Solution, row: Row, seconds: float) -> Row:
-    """The row of a run with its error."""
+    """The row of a run with its error and its outcome."""
     names = problem.system.rows
     size = sizes(found, names)
 
@@ -103,7 +104,7 @@ def _judged(problem: Problem, found: Solution, row: Row, seconds: float) -> Row:
 
 
 def _shown(problem: Problem, error: Exception, seconds: float) -> str:
-    """Whether a refusal is true, in words."""
+    """Whether a refusal is justified, in words."""
     if "rounding is the limit" in str(error):
         return "rounding"
     if not isinstance(error, SimulationError) or not error.step:
@@ -120,10 +121,10 @@ def _shown(problem: Problem, error: Exception, seconds: float) -> str:
 
 
 class Runs(Trust):
-    """What was found. rows : one for each problem. failed : cases that broke, as a sweep tells them."""
+    """The results. rows : one for each problem. failed : cases of the sweep that raised an error."""
 
     def summary(self) -> str:
-        """Counts and quantiles by tolerance, and what is above its tolerance, refused or too cautious, in Markdown."""
+        """Counts and quantiles by tolerance; exceeded tolerances, refusals and cautious estimates; in Markdown."""
         ratios = "estimate/error: least", "median", "90 %", "largest"
         head = ("tol", *OUTCOMES, *ratios, "limited", "tol/error: median", "s: median", "largest")
         lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
@@ -145,7 +146,7 @@ class Runs(Trust):
 
 
 def _line(name: str, rows: list[Row]) -> str:
-    """A line of the summary; ratios are of runs that only their tolerance limits."""
+    """A line of the summary. Ratios are those of runs that only their tolerance limits."""
     counts = [str(sum(r.outcome == outcome for r in rows)) for outcome in OUTCOMES]
     ratios = _ratios(rows)
     limited = sum(r.limited not in ("", "tolerance") for r in rows)
@@ -169,7 +170,7 @@ def trust_runs(
     archive: str | Path | None = None,
     progress: bool = True,
 ) -> Runs:
-    """Run random problems of discs to random tolerances, 1e-2 to 1e-8, and measure their errors; arguments as of `trust`."""
+    """Run random problems of discs to random tolerances, 1e-2 to 1e-8, and measure the errors; arguments as for `trust`."""
     start = checks.whole("first", first, 0)
     last = start + checks.whole("problems", problems, 1)
     limit = checks.number("seconds", seconds, positive=True)
@@ -178,6 +179,6 @@ def trust_runs(
 
 
 def gathered(results: Iterable[Result]) -> Runs:
-    """The rows of what a sweep has found so far."""
+    """The rows of the results of a sweep so far."""
     found = sorted(results, key=lambda result: result.case)
     return Runs([Row(*r.value) for r in found if not r.error], [r for r in found if r.error])

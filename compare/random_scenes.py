@@ -1,9 +1,9 @@
-r"""Random scenes with fixed seeds, on which nothing was tuned: `random_scene(seed, index)`.
+"""Random scenes with fixed seeds, used for no tuning: `random_scene(seed, index)`.
 
-The kinds take turns, so that any run of indices has all of them. Free ends ask for x'y'' = y'x'' and beta theta' = K e.r''' (the
-rod) or phi' = 0 and e.n + beta theta' = 0 (own headings). Fields here obey them, and what follows for omega: twists and rates of
-roll are sums of cos(m pi s/l), and lines are bent by a curvature with a factor sin(pi s/l)^4. The kind "bent end" breaks them on
-purpose: its curvature is not zero at the ends, which then send out ever shorter waves, and it may be refused.
+The kinds alternate, so any range of indices has all of them. Free ends require x'y'' = y'x'' and beta theta' = K e.r''' (`Rod`) or
+phi' = 0 and e.n + beta theta' = 0 (`SteeredRod`). The fields here satisfy these conditions, and those that follow for omega: twists
+and rates of roll are sums of cos(m pi s/l), and lines have a curvature with a factor sin(pi s/l)^4. The kind "bent end" violates
+them on purpose. Its curvature is not zero at the ends, which therefore send out ever shorter waves, and it may be refused.
 """
 
 from collections.abc import Callable
@@ -17,15 +17,16 @@ from discs import checks
 from discs.arrays import Float
 
 KINDS = ("twist", "bump", "bent", "rolling", "stretched", "ring", "periodic", "own", "own ring", "bent end")
-DEGREE = 255  # of the polynomials that lines are integrated with: rounding, of at most eight waves
+DEGREE = 255  # of the polynomials that integrate lines: their error is rounding, as there are at most eight waves
 PARAMETERS = {"density": 1.0, "spin_inertia": 1.0, "torsion_stiffness": 0.8, "bending_stiffness": 0.7, "radius": 1.0}
-FACTOR = 2.0  # parameters are the paper's times or over at most this
+FACTOR = 2.0  # largest ratio of a parameter to the paper's, and of the paper's to it
 
 Function = Callable[[Float], Float]
+Line = Callable[[Float], tuple[Float, Float, Float]]  # x, y and the direction phi at places s
 
 
 class Drawn(NamedTuple):
-    """A scene that was drawn: its kind, what distinguishes it in words, and a number of discs for its chain."""
+    """A random scene: its kind, a description in words, and a number of discs for its chain."""
 
     scene: Scene
     kind: str
@@ -36,15 +37,15 @@ class Drawn(NamedTuple):
 def random_scene(seed: int, index: int) -> Drawn:
     """Scene number `index` of a seed; the same on every machine.
 
-    Length 2 to 8, other parameters 1/2 to 2 times the paper's, all different; durations 0.5 to 60, log-uniform; both laws of
-    rolling; twists of 0.1 to 2 rad; bumps of width l/200 to l/4.
+    The length is 2 to 8, other parameters are 1/2 to 2 times the paper's, all different. Durations are 0.5 to 60, log-uniform. Both
+    laws of rolling occur, twists of 0.1 to 2 rad, and bumps of width l/200 to l/4.
     """
     rng = np.random.default_rng([checks.whole("seed", seed, 0), checks.whole("index", index, 0)])
     kind = KINDS[index % len(KINDS)]
     length = 4.0 * _factor(rng)
     parameters: dict[str, Any] = {name: value * _factor(rng) for name, value in PARAMETERS.items()}
     duration, law = float(_between(rng, 0.5, 60.0)), str(rng.choice(["field", "unit"]))
-    closed, own = kind in ("ring", "periodic", "own ring"), kind.startswith("own")
+    closed, steered = kind in ("ring", "periodic", "own ring"), kind.startswith("own")
     theta = _series(rng, length, closed, _between(rng, 0.1, 2.0))
     rate = _series(rng, length, closed, _between(rng, 0.05, 1.0)) if kind in ("rolling", "own", "ring") else _zero
     words = [f"twist {np.ptp(theta(np.linspace(0, length, 999))):.2g} rad"]
@@ -53,7 +54,8 @@ def random_scene(seed: int, index: int) -> Drawn:
         width = min(width, 0.1 * length if closed else width)  # its tails stay clear of the seam
         theta = _bump(height, place, width)
         words = [f"bump {height:.2g} rad, width l/{length / width:.0f}"]
-    line, shift = _straight, (0.0, 0.0)
+    line: Line = _straight
+    shift = (0.0, 0.0)
     if kind in ("bent", "bent end", "stretched", "own"):
         bend = _between(rng, 0.2, 1.5) if kind != "stretched" else 0.0
         stretch = rng.uniform(0.05, 0.4) * rng.choice([-1.0, 1.0]) if kind == "stretched" else 0.0
@@ -63,14 +65,14 @@ def random_scene(seed: int, index: int) -> Drawn:
         line = _ring(rng, length, _between(rng, 0.01, 0.15))
     elif kind == "periodic":
         line, shift = _wavy(rng, length, _between(rng, 0.005, 0.05)), (length, 0.0)
-    if own:
+    if steered:
         stretch, shear, inertia = _between(rng, 3.0, 100.0), _between(rng, 3.0, 100.0), _between(rng, 0.05, 0.5)
         parameters |= {"stretch_stiffness": stretch, "shear_stiffness": shear, "heading_inertia": inertia}
         law, words = "unit", [*words, f"A = {stretch:.3g}, G = {shear:.3g}, J = {inertia:.2g}"]
-    rod = (SteeredRod if own else Rod)(length=length, **parameters)
+    rod = (SteeredRod if steered else Rod)(length=length, **parameters)
     scene = Scene(
         rod=rod,
-        initial=Initial(line, theta, rate, own),
+        initial=Initial(line, theta, rate, steered),
         duration=duration,
         rolling=law,
         closed=closed,
@@ -82,19 +84,19 @@ def random_scene(seed: int, index: int) -> Drawn:
 
 
 class Initial:
-    """Fields at places s: x, y, theta, omega, and of own headings phi, along the line, and its rate, zero."""
+    """The fields at places s: x, y, theta, omega; for a steered rod also phi, along the line, and its rate, zero."""
 
-    def __init__(self, line: Callable[[Float], tuple[Float, Float, Float]], theta: Function, rate: Function, own: bool):
-        self.line, self.theta, self.rate, self.own = line, theta, rate, own
+    def __init__(self, line: Line, theta: Function, rate: Function, steered: bool):
+        self.line, self.theta, self.rate, self.steered = line, theta, rate, steered
 
     def __call__(self, s: Float) -> tuple[Float, ...]:
         x, y, phi = self.line(s)
         fields = x, y, self.theta(s), self.rate(s)
-        return (*fields, phi, 0 * s) if self.own else fields
+        return (*fields, phi, 0 * s) if self.steered else fields
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
-    """Log-uniform."""
+    """A log-uniform random number."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
@@ -107,7 +109,7 @@ def _zero(s: Float) -> Float:
 
 
 def _series(rng: np.random.Generator, length: float, closed: bool, size: float) -> Function:
-    """A sum of up to eight waves with coefficients that fall like exp(-m/2); `size` is the root of the sum of their squares."""
+    """A sum of up to eight waves with coefficients that decay like exp(-m/2); `size` is the root of the sum of their squares."""
     m = np.arange(0 if closed else 1, 9)
     a = rng.standard_normal(m.size) * np.exp(-m / 2)
     b = rng.standard_normal(m.size) * np.exp(-m / 2) * closed
@@ -124,8 +126,8 @@ def _straight(s: Float) -> tuple[Float, Float, Float]:
     return s, 0 * s, 0 * s
 
 
-def _line(rng: np.random.Generator, length: float, bend: float, stretch: float, ends: bool):  # type: ignore[no-untyped-def]
-    """A line with r' = (1 + stretch sin(pi s/l)^4) (cos phi, sin phi), phi turning by `bend` at most, smoothly."""
+def _line(rng: np.random.Generator, length: float, bend: float, stretch: float, ends: bool) -> Line:
+    """A line with r' = (1 + stretch sin(pi s/l)^4) (cos phi, sin phi), where phi turns smoothly by at most `bend`."""
     waves, domain = _series(rng, length, False, 1.0), [0.0, length]
 
     def curvature(s: Float) -> Float:
@@ -142,8 +144,8 @@ def _line(rng: np.random.Generator, length: float, bend: float, stretch: float, 
     return lambda s: (x(s), y(s), scale * phi(s))
 
 
-def _ring(rng: np.random.Generator, length: float, size: float):  # type: ignore[no-untyped-def]
-    """A circle of circumference `length`, its radius changed by parts of `size` in waves 2 to 4; phi along the tangent."""
+def _ring(rng: np.random.Generator, length: float, size: float) -> Line:
+    """A circle of circumference `length`, its radius perturbed by `size` (relative) in waves 2 to 4; phi along the tangent."""
     a, b = rng.standard_normal((2, 3)) * size / np.arange(2, 5)
     m, q = np.arange(2, 5), 2 * np.pi / length
 
@@ -156,7 +158,7 @@ def _ring(rng: np.random.Generator, length: float, size: float):  # type: ignore
     return line
 
 
-def _wavy(rng: np.random.Generator, length: float, size: float):  # type: ignore[no-untyped-def]
+def _wavy(rng: np.random.Generator, length: float, size: float) -> Line:
     """A straight line with waves of `size` times the length, across and along."""
     along, across = _series(rng, length, True, 0.3 * size * length), _series(rng, length, True, size * length)
     return lambda s: (s + along(s), across(s), 0 * s)

@@ -1,23 +1,24 @@
-"""Whether tolerances are kept: random scenes by `solve` and by `simulate(..., "auto")`, against references of another kind.
+"""A test of tolerances: random scenes by `solve` and by `simulate(..., "auto")`, compared with independent references.
 
-A scene is drawn (`compare.random_scenes`), and a tolerance for each of the two. What they find is held against
+A scene is drawn (`compare.random_scenes`), and a tolerance for each of the two solvers. The references are
 
-* chains : N discs, 2N and 4N, with ends of second order, extrapolated by the law 1/N^2: another discretisation. Their error is the
-  change from one extrapolation to the next over three (`continuum.solver`), and that of their steps. They reach 1e-4 to 1e-6.
-* finer : where chains err by more than a fifth of the tolerance, the field itself to a tenth of it, and to a fifth of its estimate:
-  it would be the same run where that is small. It is another run and not another kind, so chains are compared too: `unlike` says by
-  how many times their own error they differ from it.
-* gauss8 : of discs, "gauss8" with steps eight times shorter; its error is what steps four times shorter change.
+* chains : N, 2N and 4N discs, with ends of second order, extrapolated by the law 1/N^2. This is another discretisation. Its error
+  is the change from one extrapolation to the next, over three (`continuum.solver`), plus that of the steps. It reaches 1e-4 to
+  1e-6.
+* finer : if the error of the chains is more than a fifth of the tolerance, the field itself, to a tenth of its tolerance and a
+  fifth of its estimate (with the tolerance alone it could be the same run, if that estimate is small). It is another run, but of
+  the same kind. So it is compared with the chains, too: `unlike` is their difference over the error of the chains.
+* gauss8 : for discs, "gauss8" with steps eight times shorter. Its error is the change to steps four times shorter.
 
-A reference that errs by more than a fifth of the tolerance is none, and the row says so. A run is given so many seconds of
-processor time, and is cut off after.
+If the error of a reference is more than a fifth of the tolerance, the reference is not used, and the row says so. Runs are limited
+to a given processor time.
 """
 
 import re
 import signal
 import time as clock
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import cache
@@ -38,17 +39,17 @@ from discs.arrays import Float
 
 FRAMES = 6
 SIZES = (128, 256, 512)  # links of the chains of a reference
-FINER = 10.0  # times smaller is the tolerance of a field that another is held against
-KNOWN = 3.0  # an error below this many times the reference's own is not told from it: it has no ratio
+FINER = 10.0  # tolerance of a field over that of its reference
+KNOWN = 3.0  # an error below this many times that of the reference is unknown: it has no ratio
 
 
 class TimeUp(BaseException):
-    """The processor time is used up; not an `Exception`, so that nothing on the way takes it for a failure."""
+    """The processor time is used up. It is not an `Exception`, so that no handler treats it as a failure."""
 
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Raise `TimeUp` after so much processor time of this process; where there is no such clock (Windows) never."""
+    """Raise `TimeUp` after this processor time of the process; without effect on systems that have no such timer (Windows)."""
     if not hasattr(signal, "setitimer"):
         yield
         return
@@ -66,7 +67,7 @@ def at_most(seconds: float) -> Iterator[None]:
 
 
 def examine(case: list[float]) -> list[list[Any]]:
-    """The two rows of a case [seed, index, seconds]: called in other processes."""
+    """The two rows of a case [seed, index, seconds]; called in other processes."""
     seed, index, seconds = int(case[0]), int(case[1]), float(case[2])
     _warm_up()
     drawn = random_scene(seed, index)
@@ -85,7 +86,7 @@ def examine(case: list[float]) -> list[list[Any]]:
 
 @cache
 def _warm_up() -> None:
-    """Have kernels compiled or loaded before any time counts."""
+    """Compile or load the kernels before any time is measured."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for scene in (untwisting_rod(duration=0.1), steered_rod(duration=0.1), breathing_ring(duration=0.1)):
@@ -95,7 +96,7 @@ def _warm_up() -> None:
 
 
 def field_row(drawn: Drawn, row: Row, seconds: float) -> Row:
-    """The field of a scene by `solve`."""
+    """The row of the field, by `solve`."""
     scene = drawn.scene
     found, row = _tried(lambda: solve(scene, row.tol, frames=FRAMES, progress=False), row, seconds)
     if found is None:
@@ -111,16 +112,15 @@ def field_row(drawn: Drawn, row: Row, seconds: float) -> Row:
             if off <= row.tol / LEAST:
                 return _judged(row, error, off, "chains")
             finer = solve(scene, min(row.tol / FINER, estimate / LEAST), frames=FRAMES, progress=False)
-            own = max((finer.error_estimate or {})[name] for name in names)
-            unlike = _apart(scene, finer, other, names) / off
-            row = row._replace(unlike=unlike)
-            return _judged(row, _apart(scene, found, finer, names), own, "finer")
+            finer_off = max((finer.error_estimate or {})[name] for name in names)
+            row = row._replace(unlike=_apart(scene, finer, other, names) / off)
+            return _judged(row, _apart(scene, found, finer, names), finer_off, "finer")
     except (TimeUp, ValueError, SimulationError, ArithmeticError) as error:
         return row._replace(outcome="no reference", says=shorten(f"{row.says} reference: {type(error).__name__} {error}", 200))
 
 
 def discs_row(drawn: Drawn, row: Row, seconds: float) -> Row:
-    """The discs of a scene by `simulate(..., "auto")`."""
+    """The row of the discs, by `simulate(..., "auto")`."""
     try:
         problem = lump(drawn.scene, drawn.n, "springs" if drawn.scene.steered or drawn.n % 2 else "consistent")
     except ValueError as error:
@@ -148,8 +148,8 @@ def discs_row(drawn: Drawn, row: Row, seconds: float) -> Row:
         return row._replace(outcome="no reference", says=shorten(f"reference: {type(error).__name__} {error}", 200))
 
 
-def _tried(compute: Any, row: Row, seconds: float) -> tuple[Solution | None, Row]:
-    """What is computed within the time, and the row with the seconds and what was said."""
+def _tried(compute: Callable[[], Solution], row: Row, seconds: float) -> tuple[Solution | None, Row]:
+    """The result, or None if it took too long or failed; and the row with the processor time, warnings and errors."""
     begun = clock.process_time()
     found, outcome, says = None, "", ""
     with warnings.catch_warnings(record=True) as heard:
@@ -166,7 +166,7 @@ def _tried(compute: Any, row: Row, seconds: float) -> tuple[Solution | None, Row
 
 
 def _judged(row: Row, error: float, off: float, reference: str) -> Row:
-    """The row with its error, known up to what the reference errs."""
+    """The row with its error and its outcome, given the error `off` of the reference."""
     row = row._replace(error=float(error), estimate=float(row.estimate), reference=reference, reference_error=float(off))
     if off > row.tol / LEAST:
         return row._replace(outcome="no reference")
@@ -175,7 +175,7 @@ def _judged(row: Row, error: float, off: float, reference: str) -> Row:
 
 
 def _chains(scene: Scene, names: Iterable[str], tol: float) -> tuple[Solution, float]:
-    """Chains extrapolated, and their error. Steps to a hundredth of the tolerance, or to what chains can err."""
+    """Extrapolated chains, and their error. Steps are to a hundredth of the tolerance, within the limits of chains."""
     runs = []
     for size in SIZES:
         problem = lump(scene, size if scene.closed else size + 1, "springs" if scene.steered else "consistent")
@@ -191,13 +191,13 @@ def _chains(scene: Scene, names: Iterable[str], tol: float) -> tuple[Solution, f
 
 
 def _apart(scene: Scene, a: Solution, b: Solution, names: Iterable[str]) -> float:
-    """The largest difference of two fields at the places of the one with fewer."""
+    """The largest difference of two fields, at the places of the one with fewer places."""
     a, b = sorted((a, b), key=lambda run: run.s.size)
     return max(float(np.abs(getattr(a, name) - _at(scene, b, name, a.s)).max()) for name in names)
 
 
 def _at(scene: Scene, field: Solution, name: str, s: Float) -> Float:
-    """A field at places s, by its own nodes or a spline of degree 5 through them."""
+    """A field at places s: the values at its nodes, or a spline of degree 5 through them."""
     near = np.clip(np.searchsorted(field.s, s), 0, field.s.size - 1)
     near -= (near > 0) & (np.abs(field.s[near - 1] - s) < np.abs(field.s[near] - s))
     values: Float = getattr(field, name)
@@ -212,7 +212,7 @@ def _at(scene: Scene, field: Solution, name: str, s: Float) -> Float:
 
 
 def _chains_end(drawn: Drawn, seconds: float) -> str:
-    """What chains of "gauss8" with short steps do where a field or a run was refused: whether, and when, they end too."""
+    """What chains of "gauss8" with short steps do after a refusal: whether they end too, and when."""
     said = []
     for n in (65, 129):
         try:
@@ -238,13 +238,13 @@ def trust(
     archive: str | Path | None = None,
     progress: bool = True,
 ) -> Trust:
-    """Solve and run random scenes to random tolerances, 1e-2 to 1e-7, and measure their errors.
+    """Solve and run random scenes to random tolerances, 1e-2 to 1e-7, and measure the errors.
 
     Parameters
     ----------
-    scenes : how many, from number `first` on; their kinds take turns (`random_scenes.KINDS`).
-    seed : of the scenes and tolerances.
-    seconds : processor time that one `solve` or `simulate` may take, s; its reference two to four times that.
+    scenes : number of scenes, from index `first` on; their kinds alternate (`random_scenes.KINDS`).
+    seed : seed of the scenes and tolerances.
+    seconds : processor time allowed for one `solve` or `simulate`, s; two to four times that for its reference.
     executor, archive, progress : as for `compare.sweep`.
 
     Raises
@@ -259,6 +259,6 @@ def trust(
 
 
 def gathered(results: Iterable[Result]) -> Trust:
-    """The rows of what a sweep has found so far."""
+    """The rows of the results of a sweep so far."""
     found = sorted(results, key=lambda result: result.case)
     return Trust([Row(*row) for r in found if not r.error for row in r.value], [r for r in found if r.error])

@@ -1,4 +1,4 @@
-"""Whether tolerances are kept, in one table: see `compare.trust`."""
+"""The table of `compare.trust`: tolerances, errors and estimates of random scenes."""
 
 import csv
 from dataclasses import dataclass
@@ -11,19 +11,21 @@ import numpy as np
 from compare.sweeps import Result
 
 OUTCOMES = ("within", "ABOVE", "refused", "cut off", "no reference")
-LEAST = 5.0  # a reference errs by at most the tolerance over this
-MOST = 20.0  # times its error an estimate may be
+LEAST = 5.0  # the error of a reference is at most the tolerance over this
+MOST = 20.0  # largest ratio of estimate to error; above it a row is listed as cautious
 
 
 class Row(NamedTuple):
-    """A scene by `solve` or `simulate`.
+    """A scene computed by `solve` or `simulate`.
 
-    scene : seed and index. kind, law, words, duration : of the scene; words of its initial fields. by : "solve" or "simulate".
-    tol : asked for; of fields absolute, of discs relative to the largest value of each. outcome : one of OUTCOMES.
-    error, estimate : largest over positions and angles, as tol counts them; NaN where unknown. ratio : estimate over error, NaN
-    where the error is too small to be known. seconds : processor time. reference, reference_error : what it is held against.
-    unlike : by how many times their own error chains differ from the finer field. says : the refusal's words, or warnings.
-    shown : of a refusal, what chains do. limited : what made a run as accurate as it is, as its stats say; of fields nothing.
+    scene : seed and index. kind, law, words, duration : of the scene; words describe its initial fields. by : "solve" or
+        "simulate".
+    tol : the tolerance, absolute for fields, relative to the largest value of each quantity for discs. outcome : one of OUTCOMES.
+    error, estimate : the largest over positions and angles, in the units of tol; NaN if unknown. ratio : estimate over error, NaN
+        if
+    the error is too small to be known. seconds : processor time. reference, reference_error : the reference, and its error.
+    unlike : difference of the chains from the finer field, over the error of the chains. says : text of the refusal, or warnings.
+    shown : result of the chains after a refusal. limited : `limited_by` of the stats of a run; empty for fields.
     """
 
     scene: str
@@ -47,13 +49,13 @@ class Row(NamedTuple):
 
     @property
     def counts(self) -> bool:
-        """Whether its ratio counts: it is known, and nothing but the tolerance limits the run."""
+        """Whether the ratio counts: it is known, and only the tolerance limits the run."""
         return bool(np.isfinite(self.ratio)) and self.limited in ("", "tolerance")
 
 
 @dataclass(frozen=True)
 class Trust:
-    """What was found. rows : two for each scene. failed : cases that broke, as a sweep tells them."""
+    """The results. rows : two for each scene. failed : cases of the sweep that raised an error."""
 
     rows: list[Row]
     failed: list[Result]
@@ -63,7 +65,7 @@ class Trust:
         return [row for row in self.rows if row.by == by]
 
     def table(self) -> str:
-        """All rows, in Markdown, refusals with their words."""
+        """All rows as a table in Markdown, with the texts of refusals."""
         head = (
             "scene",
             "kind",
@@ -90,7 +92,7 @@ class Trust:
         return "\n".join(lines)
 
     def summary(self) -> str:
-        """Counts, the quantiles of estimate over error, and what is above its tolerance, as a table in Markdown."""
+        """Counts, quantiles of estimate over error, and exceeded tolerances, as a table in Markdown."""
         head = ("", *OUTCOMES, "estimate/error: least", "median", "90 %", "largest", "tol/error: median", "s: median", "largest")
         lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
         for by in ("solve", "simulate"):
@@ -118,7 +120,7 @@ class Trust:
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """All rows, as CSV."""
+        """Write all rows to a CSV file."""
         with Path(path).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(Row._fields)

@@ -1,4 +1,4 @@
-"""The rod as a field: the paper's scheme, a solver with an error estimate, exact solutions, linear waves."""
+"""The rod as a field: a solver with an error estimate, the paper's scheme, exact solutions and linear waves."""
 
 from continuum.free import free_rod
 from continuum.rod import Rod, Scene, SteeredRod

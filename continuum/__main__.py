@@ -12,28 +12,32 @@ from discs import command_line
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options."""
+    """The parser of the command line."""
     p = argparse.ArgumentParser(
         prog="python -m continuum", description="The nonholonomic Cosserat rod: its fields, and its discs. Any consistent units."
     )
     commands = p.add_subparsers(metavar="COMMAND", title="commands", required=True, dest="command")
     field = commands.add_parser(
-        "solve", help="the fields of a scene to a tolerance", description="The fields of a scene, with an error estimate."
+        "solve", help="the fields of a scene to a tolerance", description="Compute the fields of a scene, with an error estimate."
     )
     _add_scene(field)
     field.add_argument(
         "--tol", metavar="TOL", type=float, default=1e-5, help="largest error of x, y (length), theta, phi (rad) (default: 1e-5)"
     )
     field.add_argument(
-        "--method", metavar="NAME", help="as continuum.solve has them, leapfrog the paper's (default: what fits the scene)"
+        "--method", metavar="NAME", help="spectral, richardson, elements or leapfrog, see continuum.solve (default: fits the scene)"
     )
-    field.add_argument("--n", metavar="N", type=int, help="points of leapfrog (default: 32)")
-    field.add_argument("--dt", metavar="DT", type=float, help="step of leapfrog, time (default: k^2/8)")
-    field.add_argument("--frames", metavar="F", type=int, default=101, help="frames, equally spaced over the time (default: 101)")
+    field.add_argument("--n", metavar="N", type=int, help="nodes of leapfrog (default: 32)")
+    field.add_argument("--dt", metavar="DT", type=float, help="time step of leapfrog (default: k^2/8)")
+    field.add_argument(
+        "--frames", metavar="F", type=int, default=101, help="number of frames, equally spaced in time (default: 101)"
+    )
     command_line.add_saving(field)
     field.set_defaults(run=run_solve)
     discs = commands.add_parser(
-        "discs", help="a scene's rod as N discs", description="A scene's rod lumped into N discs, run as by python -m discs run."
+        "discs",
+        help="a scene's rod as N discs",
+        description="Lump a scene's rod into N discs and run them as python -m discs run does.",
     )
     _add_scene(discs)
     command_line.add_run_options(discs)
@@ -68,7 +72,7 @@ def run_discs(options: argparse.Namespace) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; returns the exit code: 0 done, 1 the motion could not go on, 2 bad input, 130 interrupted."""
+    """Run the command line. Returns the exit code: 0 done, 1 the motion could not continue, 2 bad input, 130 interrupted."""
     return command_line.main(parser(), arguments)
 
 

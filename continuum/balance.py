@@ -1,12 +1,12 @@
-r"""Conservation laws, section 3.4 of the paper and its appendix: density, flux and source along a motion.
+"""Conservation laws (section 3.4 of the paper and its appendix): density, flux and source of each along a motion.
 
-With the contact force n = p r' - K r''' (p = 0 for the rolling rod), in one form for both rods,
+With the contact force n = p r' - K r''' (p = 0 for the rolling rod), the equations of both rods read
 
-    rho r.. = n' + lambda,   alpha theta.. = beta theta'' - e . lambda,
+    rho r.. = n' + lambda,   alpha theta.. = beta theta'' - e . lambda.
 
-lambda = 0 for the free rod; for the rolling one r. = e theta., and lambda is the ground's force per length. Each symmetry of the
-Lagrangian gives d_t D + d_s F = S: multiply the equations by what the symmetry moves, a rate Q = (Q_r, Q_theta), and collect. The
-virtual work of the ground is the source, S = lambda . (Q_r - e Q_theta):
+The free rod has lambda = 0. The rolling rod has r. = e theta., and lambda is the force of the ground per length. Each symmetry of
+the Lagrangian gives a balance d_t D + d_s F = S: multiply the equations by Q = (Q_r, Q_theta), the rate at which the symmetry moves
+the fields, and add them. The source is the virtual work of the ground, S = lambda . (Q_r - e Q_theta):
 
 | law               | Q            | density D                     | flux F                  | source S               |
 | ----------------- | ------------ | ----------------------------- | ----------------------- | ---------------------- |
@@ -17,17 +17,19 @@ virtual work of the ground is the source, S = lambda . (Q_r - e Q_theta):
 | angular_momentum  | (J r, 0)     | rho r x r.                    | -r x n - K r' x r''     | r x lambda             |
 | material_momentum | (r', theta') | rho r.r' + alpha theta.theta' | K r'.r''' - p - T - V   | lambda.(r' - e theta') |
 
-T = (rho |r.|^2 + alpha theta.^2)/2, V = (K |r''|^2 + beta theta'^2)/2, a x b = a_x b_y - a_y b_x. For example
-r x n' = (r x n)' - r' x n with r' x n = -(K r' x r'')', and p r'.r.' = 0 where there is a p. The paper's forms are J = D ds - F dt,
-up to a common sign; its angular momentum is printed with -K(x''y' + y''x') where -K(x''y' - y''x') follows. material_momentum, of
-s -> s + const, is not in the paper: the rod is homogeneous, so that it is a law of the free rod too.
+T = (rho |r.|^2 + alpha theta.^2)/2, V = (K |r''|^2 + beta theta'^2)/2, a x b = a_x b_y - a_y b_x. The derivation uses
+r x n' = (r x n)' - r' x n with r' x n = -(K r' x r'')', and, with tension, p r'.r.' = 0. The paper's forms are J = D ds - F dt, up
+to a common sign. Its angular momentum is printed with -K(x''y' + y''x'), where -K(x''y' - y''x') follows. The law of
+material_momentum belongs to the symmetry s -> s + const. It is not in the paper, but holds for the free rod, which is homogeneous.
 
 **Noether's condition** (NHnoether): a symmetry gives a conservation law of the rolling rod if its generator, contracted with the
-forms of the bundle (bundleF), is zero on the constraint: Q_r - e Q_theta = 0. That is rolling itself for the passing of time, and
-fails for the others: their laws are balances with the source, the nonholonomic momentum equation of the paper's conclusions.
+forms of the bundle (bundleF), is zero on the constraint, that is, if Q_r - e Q_theta = 0. For the symmetry in time this is the
+rolling constraint itself. For the other symmetries it fails: their laws are balances with a source, the nonholonomic momentum
+equation of the paper's conclusions.
 
-Derivatives in s are those of splines of degree 7 through the nodes; lambda is formed from x, y, theta, omega at one time, with
-omega. eliminated. Differences in time give d_t D, and the Q of the first row, so that its violation is measured.
+Derivatives in s are those of splines of degree 7 through the nodes. lambda follows from x, y, theta and omega at one time, with
+omega. eliminated. d_t D and the Q of the first row are computed by differences in time, so that the violation of the first row is
+measured, too.
 """
 
 from typing import NamedTuple
@@ -45,7 +47,7 @@ LAWS = ("energy", "momentum_x", "momentum_y", "theta_momentum", "angular_momentu
 
 
 class Balance(NamedTuple):
-    """One law along a motion: d_t density + d_s flux = source, and how far Noether's condition is from holding.
+    """One law along a motion, d_t density + d_s flux = source, with the violation of Noether's condition.
 
     density, flux, source : (F, N).
     violation : (F, N), |Q_r - e Q_theta|; zero for the free rod.
@@ -68,23 +70,23 @@ def balances(
 
     Parameters
     ----------
-    rod : with linear curvature.
-    run : from `solve` or `simulate`, or from `free_rod`; at least 8 nodes, and 3 frames near to each other: the error of d_t is of
-        the order of their distance squared.
-    rolling : a name in `discs.chains.rolling`, "field" or "unit", or None for the free rod.
-    closed, shift : of the scene.
+    rod : a rod with linear curvature.
+    run : the motion, from `solve`, `simulate` or `free_rod`, with at least 8 nodes and 3 frames. The frames must be close together:
+        the error of d_t is of second order in their distance.
+    rolling : the law of rolling, a name in `discs.chains.rolling` such as "field" or "unit"; None for the free rod.
+    closed, shift : as in the scene.
 
     Returns
     -------
-    Balances by name, LAWS. The rolling rod has a thin layer at free ends that splines do not see: derivatives in the last nodes
-    are of little worth, and a flux through an end is zero but for O(k).
+    The balances by name, see LAWS. The rolling rod has a thin layer at free ends, which splines do not resolve. Derivatives at the
+    last nodes are inaccurate there, and the flux through an end is zero only up to O(k).
 
     Raises
     ------
-    ValueError : for another bending law, too few frames or nodes, or a free rod's motion without velocities and tension.
+    ValueError : for another bending law, too few frames or nodes, or a motion of the free rod without velocities and tension.
     """
     if isinstance(rod, SteeredRod) or not isinstance(rod, Rod) or rod.curvature != "linear":
-        raise ValueError(f"balances are those of a Rod with curvature='linear'; got {rod!r}")
+        raise ValueError(f"balances need a Rod with curvature='linear'; got {rod!r}")
     frames, nodes = run.x.shape
     if frames < 3 or nodes <= DEGREE:
         raise ValueError(f"balances need at least 3 frames and {DEGREE + 1} nodes; got {frames} and {nodes}")
@@ -98,13 +100,13 @@ def balances(
         return np.gradient(values, run.t, axis=-2, edge_order=2)
 
     r, theta1, omega = np.stack([run.x, run.y]), along(run.theta), run.omega
-    chord = advance * run.s  # what of r is not periodic
+    chord = advance * run.s  # r - chord is periodic
     r1, r2, r3, r4 = (along(r - chord, order) for order in (1, 2, 3, 4))
     r1 += advance
     rho, alpha, beta, bend = rod.density, rod.spin_inertia, rod.torsion_stiffness, rod.bending_stiffness
     if rolling is None:
         if run.x_rate is None or run.y_rate is None or run.tension is None:
-            raise ValueError("rolling=None is for the free rod, whose motion has x_rate, y_rate and tension")
+            raise ValueError("rolling=None needs a motion of the free rod, with x_rate, y_rate and tension")
         v, p = np.stack([run.x_rate, run.y_rate]), _at_nodes(run.s, run.tension, period)
         e = force = np.zeros_like(r)
     else:
@@ -130,7 +132,7 @@ def balances(
     for name, (move, turn, density, flux) in laws.items():
         slip = np.zeros_like(r) if rolling is None else np.asarray(move) - e * turn
         source = _dot(force, slip)
-        if name == "angular_momentum" and closed:  # r x n is not periodic where r advances
+        if name == "angular_momentum" and closed:  # r x n is not periodic if r advances
             flux_s = along(flux + _cross(chord, n)) - _cross(advance, n) - _cross(chord, along(n))
         else:
             flux_s = along(flux)
@@ -140,7 +142,7 @@ def balances(
 
 
 def noether(found: dict[str, Balance]) -> dict[str, float]:
-    """Largest violation of Noether's condition along a motion by law; a law without one is a conservation law."""
+    """The largest violation of Noether's condition along a motion, by law. A law without violation is a conservation law."""
     return {name: float(law.violation.max()) for name, law in found.items()}
 
 
@@ -155,12 +157,12 @@ def _cross(a: Float, b: Float) -> Float:
 
 
 def _turned(a: Float) -> Float:
-    """J a."""
+    """J a, turned by +90 degrees."""
     return np.stack([-a[1], a[0]])
 
 
 def _spline(s: Float, values: Float, period: float | None) -> Spline:
-    """Spline of degree 7 through values (..., N), periodic if there is a period."""
+    """Spline of degree 7 through values (..., N), periodic if a period is given."""
     ends = None
     if period is not None:
         s, values, ends = np.append(s, s[0] + period), np.concatenate([values, values[..., :1]], axis=-1), "periodic"
@@ -169,7 +171,7 @@ def _spline(s: Float, values: Float, period: float | None) -> Spline:
 
 
 def _at_nodes(s: Float, tension: Float, period: float | None) -> Float:
-    """Tension of links at the nodes, (F, N); it is zero at free ends."""
+    """Tension of links, interpolated at the nodes, (F, N); it is zero at free ends."""
     middle = s[: tension.shape[1]] + s[1] / 2
     if period is not None:
         return _spline(middle, tension, period)(s)

@@ -1,22 +1,23 @@
-r"""Discrete field theory on cells, the paper's sections 4.1 and 4.2, with SymPy.
+"""Discrete field theory on cells (sections 4.1 and 4.2 of the paper), with SymPy.
 
 A discrete field has values y_{n,i} at time level n and node i, written y[n, i] with a SymPy IndexedBase y. The discrete Lagrangian
-L_d is a function of the values in a cell (6cell), levels n and n+1, any nodes about i; its action sum is the sum over all cells
-(actionsum). A value y_{n,i} stands in several cells, in each at another of its points p, and the action sum is stationary where
+L_d is a function of the values in a cell (6cell): levels n and n+1, any nodes about i. The action sum is the sum of L_d over all
+cells (actionsum). A value y_{n,i} belongs to several cells, and is a different point p of each. The action sum is stationary where
 
-    E = sum_p D_p L_d (cell that has (n, i) as its point p) = 0,
+    E = sum_p D_p L_d (cell that has (n, i) as its point p) = 0.
 
-the discrete Euler-Lagrange field equations (discEL), D_1 + ... + D_6 for the six points of (6cell).
+These are the discrete Euler-Lagrange field equations (discEL), with D_1 + ... + D_6 for the six points of (6cell).
 
-A constraint is first made discrete in s only: phi_half, a function of values at level n and of the velocities at (n, i), written
-`velocity(y)`. Its reaction force is Phi = S*(d phi_half) = (dphi_half/dy.^a) dy^a, at node i. Differences in place of the
-velocities turn Phi into a form in the values and phi_half into the constraint phi_d. By the discrete d'Alembert principle (discNH)
+A constraint is first discretised in s only: phi_half, a function of the values at level n and of the velocities at (n, i), written
+`velocity(y)`. Its reaction force is Phi = S*(d phi_half) = (dphi_half/dy.^a) dy^a, at node i. Replacing the velocities by
+differences turns Phi into a form in the values, and phi_half into the constraint phi_d. By the discrete d'Alembert principle
+(discNH)
 
     E_a = lambda_alpha Phi^alpha_a,   phi_d^alpha = 0.
 
-The paper's 6-cell has no level n-1; its section 4.3 uses it in phi_d (central differences), and so may constraints here.
+The paper's 6-cell has no level n-1. Its section 4.3 uses level n-1 in phi_d (central differences), so constraints may use it here.
 
-`continuum.lattice` turns a `CellTheory` into residuals and steps. Letters of this module: n, i; the steps h in time and k in s.
+`continuum.lattice` turns a `CellTheory` into residuals and steps. Symbols of this module: n, i; the steps h in time and k in s.
 """
 
 from collections.abc import Iterable, Sequence
@@ -34,7 +35,7 @@ h, k = sy.symbols("h k", positive=True)
 
 
 class Point(NamedTuple):
-    """A value in a cell: which field, level relative to n, node relative to i."""
+    """A point of a cell: the field, its level relative to n, its node relative to i."""
 
     field: sy.IndexedBase
     level: int
@@ -45,7 +46,7 @@ class Point(NamedTuple):
 
 
 def points(expression: sy.Expr) -> dict[sy.Indexed, Point]:
-    """The cell's values that an expression has.
+    """The points of the cell whose values occur in an expression.
 
     Raises
     ------
@@ -55,30 +56,30 @@ def points(expression: sy.Expr) -> dict[sy.Indexed, Point]:
     for value in sorted(expression.atoms(sy.Indexed), key=str):
         steps = [index - centre for index, centre in zip(value.indices, (n, i), strict=False)]
         if len(value.indices) != 2 or not all(step.is_Integer for step in steps):
-            raise ValueError(f"a cell's values must be at whole steps from [n, i], such as x[n + 1, i - 1]; got {value}")
+            raise ValueError(f"values of a cell must be at whole steps from [n, i], such as x[n + 1, i - 1]; got {value}")
         found[value] = Point(value.base, *map(int, steps))
     return found
 
 
 def velocity(field: sy.IndexedBase) -> sy.Symbol:
-    """The velocity of a field at (n, i) in semi-discrete constraints."""
+    """The symbol for the velocity of a field at (n, i) in semi-discrete constraints."""
     return sy.Symbol(f"d{field.label}/dt")
 
 
 def in_space(expression: sy.Expr, coordinates: tuple[sy.Symbol, sy.Symbol], forward: Iterable[AppliedUndef] = ()) -> sy.Expr:
     """Replace fields by values at (n, i), time derivatives by velocities, derivatives in s by differences: (FDeta), (FDtheta).
 
-    y' is (y_{n,i+1} - y_{n,i-1})/2k, for fields named in `forward` (y_{n,i+1} - y_{n,i})/k; y'' is the second difference.
+    y' becomes (y_{n,i+1} - y_{n,i-1})/2k, for fields in `forward` (y_{n,i+1} - y_{n,i})/k. y'' becomes the second difference.
 
     Parameters
     ----------
     expression : in functions of (t, s) and their derivatives y., y', y'', as for `continuum.lagrangian`.
     coordinates : (t, s).
-    forward : functions whose y' is the forward difference.
+    forward : functions whose y' becomes the forward difference.
 
     Raises
     ------
-    ValueError : for another derivative.
+    ValueError : for any other derivative.
     """
     t, s = coordinates
     expression = sy.sympify(expression).doit()
@@ -99,7 +100,7 @@ def in_space(expression: sy.Expr, coordinates: tuple[sy.Symbol, sy.Symbol], forw
 
 
 def in_time(expression: sy.Expr, fields: Iterable[sy.IndexedBase], difference: str) -> sy.Expr:
-    """Replace velocities: "forward", (y_{n+1,i} - y_{n,i})/h, or "central", (y_{n+1,i} - y_{n-1,i})/2h."""
+    """Replace velocities by "forward", (y_{n+1,i} - y_{n,i})/h, or "central" differences, (y_{n+1,i} - y_{n-1,i})/2h."""
     back = {"forward": 0, "central": 1}[checks.choice("difference", difference, ("forward", "central"))]
     rules = {velocity(y): (y[n + 1, i] - y[n - back, i]) / ((1 + back) * h) for y in fields}
     return sy.sympify(expression).xreplace(rules)
@@ -111,8 +112,9 @@ class Part:
 
     Parameters
     ----------
-    expression : in values of a cell, the module's h, k and i, and any symbols.
-    cells : None, all nodes i whose cells lie on the lattice; a slice of these nodes; or a whole number, one cell at an end.
+    expression : in values of a cell, the symbols h, k and i of this module, and any other symbols.
+    cells : the nodes i. None for all nodes whose cells lie on the lattice, a slice of these nodes, or a whole number for one cell
+        at an end.
     """
 
     expression: sy.Expr
@@ -131,7 +133,7 @@ class Constraint(Part):
     Parameters
     ----------
     expression, cells : as for `Part`.
-    discrete : phi_d, in values of the levels n-1, n, n+1; None, phi_half with differences for the velocities.
+    discrete : phi_d, in values of the levels n-1, n, n+1; None for phi_half with differences in place of the velocities.
     """
 
     discrete: sy.Expr | None = None
@@ -143,11 +145,11 @@ class CellTheory:
 
     Parameters
     ----------
-    lagrangian : L_d, per unit of s and t, or several parts that add up to it, each an expression or a `Part`. At free ends a part
-        is summed over the cells that have all its points on the lattice, so kinetic energy, torsion and bending go as parts.
-    fields : IndexedBase symbols.
+    lagrangian : L_d, per unit of s and t: an expression or a `Part`, or several that add up to L_d. At free ends a part is summed
+        over the cells that have all its points on the lattice, so kinetic energy, torsion and bending must be separate parts.
+    fields : the IndexedBase symbols.
     constraints : phi_half, each an expression or a `Constraint`.
-    difference : what stands for velocities in Phi and phi_d, "central" or "forward"; see `in_time`.
+    difference : the differences that replace velocities in Phi and phi_d, "central" or "forward"; see `in_time`.
 
     Raises
     ------
@@ -172,20 +174,22 @@ class CellTheory:
         reached = {(p.field, p.level) for part in self.lagrangian for p in points(part.expression).values()}
         if reached != {(y, level) for y in self.fields for level in (0, 1)}:
             whole = " + ".join(str(part.expression) for part in self.lagrangian)
-            raise ValueError(f"L_d must have values of levels n and n + 1 of each field; got {whole}")
+            raise ValueError(f"L_d must contain values of each field at levels n and n + 1; got {whole}")
         for constraint, phi, row in zip(self.constraints, self.discrete_constraints, self.forces, strict=True):
             self._check("phi_half", constraint.expression, (0,))
             self._check("phi_d", phi, (-1, 0, 1))
             if not any(row):
-                raise ValueError(f"a constraint must have velocities (`velocity`), or it has no force; got {constraint.expression}")
+                raise ValueError(
+                    f"a constraint must contain velocities (`velocity`), or it has no force; got {constraint.expression}"
+                )
 
     def _check(self, name: str, expression: sy.Expr, levels: tuple[int, ...]) -> None:
         for point in points(expression).values():
             if point.field not in self.fields:
-                raise ValueError(f"{name} must be in values of {', '.join(map(str, self.fields))}; got {point}")
+                raise ValueError(f"{name} must depend on values of {', '.join(map(str, self.fields))} only; got {point}")
             if point.level not in levels:
                 allowed = ", ".join(str(n + level) for level in levels)
-                raise ValueError(f"{name} must be in values of the levels {allowed}; got {point}")
+                raise ValueError(f"{name} must depend on values at the levels {allowed} only; got {point}")
 
     @property
     def multipliers(self) -> tuple[sy.Expr, ...]:
@@ -194,7 +198,7 @@ class CellTheory:
 
     @cached_property
     def discrete_constraints(self) -> tuple[sy.Expr, ...]:
-        """phi_d for each constraint; their zeros are the paper's C_d."""
+        """phi_d for each constraint; the paper's C_d is where they vanish."""
         return tuple(
             in_time(c.expression, self.fields, self.difference) if c.discrete is None else sy.sympify(c.discrete)
             for c in self.constraints
@@ -202,12 +206,12 @@ class CellTheory:
 
     @cached_property
     def forces(self) -> tuple[tuple[sy.Expr, ...], ...]:
-        """Phi^alpha_a, a row for each constraint and an entry for each field; differences stand for velocities."""
+        """Phi^alpha_a, a row for each constraint and an entry for each field, with differences in place of the velocities."""
         rows = [[c.expression.diff(velocity(y)) for y in self.fields] for c in self.constraints]
         return tuple(tuple(in_time(entry, self.fields, self.difference) for entry in row) for row in rows)
 
     def euler_lagrange(self) -> tuple[sy.Expr, ...]:
-        """E, the left side of (discEL), one expression for each field at (n, i) away from ends: parts of one cell are left out."""
+        """E, the left side of (discEL), for each field at (n, i) away from ends; parts of a single cell are left out."""
         total = dict.fromkeys(self.fields, sy.S.Zero)
         for part in self.lagrangian:
             if not isinstance(part.cells, int):
@@ -216,7 +220,7 @@ class CellTheory:
         return tuple(sy.expand(e) for e in total.values())
 
     def equations(self) -> tuple[sy.Expr, ...]:
-        """E_a - lambda_alpha Phi^alpha_a (discNH) at (n, i) away from ends; closed by `discrete_constraints`."""
+        """E_a - lambda_alpha Phi^alpha_a (discNH) at (n, i) away from ends. `discrete_constraints` close the system."""
         inner = [a for a, c in enumerate(self.constraints) if not isinstance(c.cells, int)]
         reaction = [sum(self.multipliers[a] * self.forces[a][f] for a in inner) for f in range(len(self.fields))]
         return tuple(sy.expand(e - r) for e, r in zip(self.euler_lagrange(), reaction, strict=True))

@@ -1,17 +1,19 @@
-"""What guides the Gauss steps of a rod on n functions, and its motion within them; the compiled twin is `continuum.kernels`.
+"""A Gauss step of a rod on n functions; the compiled twin is in `continuum.kernels`.
 
-The stages are those of `discs.integrators.gauss`, and so is a sweep. Three things differ, as steps are long here and matrices full.
-The common C is that of an earlier step, and its matrix is kept by its eigenvectors, which serve all lengths of steps. A step ends
-when the rates of all stages are settled, not only the momenta. And sweeps are mixed by Anderson's method of depth 2 (Walker and Ni,
-SIAM J. Numer. Anal. 49, 2011): the next guess is that combination of the last three results, with factors of sum one, whose changes
-add up to the least. Sweeps then converge for longer steps, in half their number and less.
+Stages and sweeps are those of `discs.integrators.gauss`. Three things differ, because steps are long here and matrices are full:
 
-Within a step the motion is that of the collocation polynomials, of degree s in time for s stages: with rates v_j and momenta p_j of
-the stages at c_j, and Lagrange's polynomials l_j through all c, L_j through 0 and all c,
+1. The common C is that of an earlier step. Its matrix is stored by its eigenvectors, which serve for every length of step.
+2. A step ends when the rates of all stages have converged, not only the momenta.
+3. Sweeps are accelerated by Anderson mixing of depth 2 (Walker and Ni, SIAM J. Numer. Anal. 49, 2011): the next guess is the
+   combination of the last three results, with factors whose sum is one, that has the least sum of changes. Sweeps then converge
+   for longer steps, and in half the number or fewer.
 
-    q(t + tau h) = q + h sum_j v_j int_0^tau l_j,   pi(t + tau h) = pi + sum_j (p_j - pi) L_j(tau),
+Within a step the motion is given by the collocation polynomials, of degree s in time for s stages. With the rates v_j and momenta
+p_j of the stages at c_j, and the Lagrange polynomials l_j through all c, and L_j through 0 and all c,
 
-which at tau = 1 are the step's end.
+    q(t + tau h) = q + h sum_j v_j int_0^tau l_j,   pi(t + tau h) = pi + sum_j (p_j - pi) L_j(tau).
+
+At tau = 1 these give the end of the step.
 """
 
 import signal
@@ -28,7 +30,7 @@ from discs.skew import Phase, add
 
 
 class Frozen(Guide):
-    """The modes of a configuration not far away; sweeps are mixed."""
+    """The frozen part of the sweeps: the modes of a nearby configuration. It mixes sweeps."""
 
     def __init__(self, rod: SpectralRod, z: Phase, modes: Modes, h: float, tolerance: float) -> None:
         self._rod, self._modes, self._h, self._tolerance = rod, modes, h, tolerance
@@ -55,14 +57,20 @@ class Frozen(Guide):
 def step(
     rod: SpectralRod, z: Phase, modes: Modes, t: float, h: float, stages: int, sweeps: int, tolerance: float, compiled: bool = True
 ) -> tuple[Phase, Float, Float, int]:
-    """The state a time h after z at t, the rates (stages, 3, n) and momenta (stages, n) of the stages, and the number of sweeps.
+    """One Gauss step.
 
     Parameters
     ----------
-    modes : of a configuration not far away.
-    stages : even.
-    tolerance : of the positions' last change, in units of `rod.scale`; where so many `sweeps` do not reach it, 0 is returned, and
-        the rest is undefined.
+    modes : the modes of a nearby configuration.
+    t : the time of z.
+    stages : number of stages, even.
+    sweeps : largest number of sweeps.
+    tolerance : sweeps end when the positions change by less than this, in units of `rod.scale`.
+
+    Returns
+    -------
+    The state a time h after z, the rates (stages, 3, n) and momenta (stages, n) of the stages, and the number of sweeps. The number
+    is 0 if sweeps did not converge; the other results are then undefined.
     """
     rule = tableau(stages)
     if not compiled:
@@ -79,7 +87,7 @@ def step(
 
 
 def within(z: Phase, h: float, v: Float, p: Float, parts: Float) -> Phase:
-    """The states at z's time plus `parts` (F,) of a step's h, each array with F before its axes; v and p as `step` returns them."""
+    """The states at fractions `parts` (F,) of a step of length h from z, arrays with a first axis F. v and p are from `step`."""
     rates, momenta = _polynomials(len(v))
     series = legendre.legvander(2 * parts - 1, len(v))
     return Phase(*add(z.hi, z.lo, h * np.tensordot(series @ rates, v, 1)), z.pi + series @ momenta @ (p - z.pi))
@@ -94,7 +102,7 @@ def _polynomials(stages: int) -> tuple[Float, Float]:
 
 
 def mixing(changes: list[Float]) -> Float:
-    """Factors of sum one that make the sum of at most three changes the least; the newest comes first."""
+    """The factors, of sum one, that make the sum of at most three changes the smallest. The newest change is the first."""
     newest = changes[0].ravel()
     less = np.array([newest - other.ravel() for other in changes[1:]]).reshape(-1, newest.size)
     others = np.linalg.lstsq(less.T, newest, rcond=1e-6)[0]

@@ -1,4 +1,4 @@
-"""Where a field needs more functions: a coordinate xi in [-1, 1] in which narrow features of the initial data are wide."""
+"""Local refinement: a coordinate xi in [-1, 1] in which narrow features of the initial data are wide."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,21 @@ import numpy as np
 from continuum.initial import Resolved
 from discs.arrays import Float
 
-REACH = 2.5  # of a centre, in widths of its feature
-CROWD = 0.3  # of a centre: its share of xi, over that of the whole rod
-EVEN = 1.2  # a: 0 leaves the functions' crowd at the ends, pi/2 takes it away
+REACH = 2.5  # w_c, in widths of the feature
+CROWD = 0.3  # share of xi that a centre adds, relative to the rest of the rod
+EVEN = 1.2  # a: with 0 functions are densest at the ends, with pi/2 they are evenly spaced
 
 
 @dataclass(frozen=True)
 class Density:
     """xi = sin(a u)/sin(a), u' proportional to 1 + sum_c A_c/(1 + ((s - s_c)/w_c)^2) on [0, length], from -1 to 1.
 
-    Without centres xi is linear. The sine (Kosloff and Tal-Ezer, J. Comput. Phys. 104, 1993) takes functions from the ends, where
-    polynomials crowd, to the inside: narrow features send short waves everywhere.
+    Without centres xi is linear in s. The sine (Kosloff and Tal-Ezer, J. Comput. Phys. 104, 1993) moves functions from the ends,
+    where polynomials are dense, to the interior, because narrow features send out short waves to everywhere.
 
     Parameters
     ----------
-    centres : (s_c, w_c, A_c): place, reach and height.
+    centres : (s_c, w_c, A_c) for each feature: place, width and height.
     """
 
     length: float
@@ -29,9 +29,10 @@ class Density:
 
     @classmethod
     def of(cls, initial: Resolved) -> "Density":
-        """A density for a scene's narrow features: each gets functions for a share of the rod, however narrow it is.
+        """The density for the narrow features of a scene. Each gets functions for a fixed share of the rod, however narrow it is.
 
-        Linear on a closed scene, and where fields vary over short distances everywhere: there are no places to prefer.
+        xi is linear if the scene is closed, and if the fields vary over short distances everywhere, so that no places are
+        preferred.
         """
         scene, widths = initial.scene, np.diff(initial.pieces)
         length, middle = scene.rod.length, initial.pieces[:-1] + widths / 2
@@ -45,7 +46,7 @@ class Density:
         return cls(length, tuple(centres))
 
     def _grown(self, s: Float | float) -> Float:
-        """int xi' ds, but for a factor and a constant."""
+        """int xi' ds, up to a factor and a constant."""
         total = np.array(s, dtype=float)
         for place, reach, height in self.centres:
             total += height * reach * np.arctan((s - place) / reach)
@@ -84,7 +85,7 @@ class Density:
         return second
 
     def place(self, xi: Float) -> Float:
-        """s at xi (S,): by halving, then by Newton steps to round-off."""
+        """s at xi (S,), by bisection and then Newton's method to round-off."""
         if not self.centres:
             return (xi + 1) * (self.length / 2)
         low, high = np.zeros_like(xi), np.full_like(xi, self.length)

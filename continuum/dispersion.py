@@ -1,4 +1,4 @@
-"""Linear waves about the straight rod, continuous and for n discs; `model` in docs gives the derivation."""
+"""Linear waves of the straight rod, as a field and as n discs; the page `model` of the documentation has the derivation."""
 
 from typing import NamedTuple
 
@@ -12,14 +12,14 @@ from discs.chains.rolling import ROLLING, stretching
 
 
 class Symbols(NamedTuple):
-    """What stands for q^2 in second differences (stiffness) and for q in headings."""
+    """The Fourier symbols that replace q^2 in second differences (stiffness) and q in headings."""
 
     second: Float
     first: Float
 
 
 def symbols(q: ArrayLike, k: float | None = None) -> Symbols:
-    """q^2 and q, or for discs of spacing k their twins t = 4/k^2 sin^2(qk/2) and c = sin(qk)/k."""
+    """q^2 and q; for discs of spacing k their counterparts t = 4/k^2 sin^2(qk/2) and c = sin(qk)/k."""
     q = np.asarray(q, dtype=float)
     return Symbols(q**2, q) if k is None else Symbols((2 / k * np.sin(q * k / 2)) ** 2, np.sin(q * k) / k)
 
@@ -30,7 +30,7 @@ def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> Float:
     Parameters
     ----------
     q : wave numbers, 1/length.
-    k : spacing of discs, None for the field.
+    k : spacing of discs; None for the field.
     """
     t, _ = symbols(q, k)
     return np.sqrt((rod.torsion_stiffness * t + rod.bending_stiffness * rod.radius**2 * t**2) / rod.inertia)
@@ -39,14 +39,16 @@ def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> Float:
 def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: float | None = None) -> Float:
     """Largest growth rate sigma of a perturbation of wave number q of the straight rod rolling sideways at rate omega.
 
-    With M = alpha + rho R^2 and gamma = `stretching(law)`, 1 under the field law and 0 under the unit law, the largest real part of
+    With M = alpha + rho R^2 and gamma = `stretching(law)`, which is 1 for the field law and 0 for the unit law, it is the largest
+    real part of a root of
 
         M sigma^4 + sigma^2 [beta q^2 + K R^2 q^4 - gamma alpha R^2 omega^2 q^2] - gamma beta R^2 omega^2 q^4 = 0.
 
-    To first order in r = (s + xi, R omega t + eta), any law has h(r') = (1 + gamma xi', eta'). Rolling then asks for
+    Derivation: to first order in r = (s + xi, R omega t + eta), any law has h(r') = (1 + gamma xi', eta'). Rolling then requires
     sigma xi = -R omega eta' and sigma eta = R (sigma vartheta + gamma omega xi'), and the equation of motion is
     M sigma^2 vartheta + rho gamma R^2 omega sigma xi' = beta vartheta'' - K R d^4 eta/ds^4.
-    Field law: sigma -> omega sqrt(beta/K) as q -> infinity, unbounded in q if K = 0. Unit law: zero.
+
+    Field law: sigma -> omega sqrt(beta/K) as q -> infinity; it is unbounded in q if K = 0. Unit law: sigma = 0.
     """
     gamma = stretching(ROLLING[checks.choice("rolling", rolling, ROLLING)])
     t, c = symbols(q, k)
@@ -54,7 +56,7 @@ def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: floa
     b = rod.torsion_stiffness * t + rod.bending_stiffness * r2 * t**2 - rod.spin_inertia * r2 * push
     last = rod.torsion_stiffness * r2 * push * t
     root = np.emath.sqrt(b**2 + 4 * rod.inertia * last)
-    # both forms of the larger root of M u^2 + b u - last, each where it does not cancel
+    # the larger root of M u^2 + b u - last, in the form without cancellation for each sign of b
     with np.errstate(divide="ignore", invalid="ignore"):
         square = np.where(b > 0, 2 * last / (root + b), (root - b) / (2 * rod.inertia))
     growing: Float = np.emath.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square)).real
@@ -62,12 +64,15 @@ def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: floa
 
 
 def steered_frequencies(rod: SteeredRod, q: ArrayLike, k: float | None = None) -> Float:
-    """Frequencies of small waves of the straight rod whose sections have headings of their own, at rest or rolling.
+    """Frequencies of small waves of the straight steered rod (sections with headings of their own), at rest or rolling.
 
-    With small phi, y = R theta + const and sideways force G (y' - phi): (M Omega^2 - (beta + G R^2) q^2)(J Omega^2 - K q^2 - G)
-    = G^2 R^2 q^2. Both Omega^2 are positive: no wave grows. Rolling at a rate omega adds only x. = -R omega phi, which nothing
-    depends on at first order. For discs of spacing k, t = 4/k^2 sin^2(qk/2) stands for q^2, and c = cos(qk/2) for the mean of two
-    headings: (M Omega^2 - (beta + G R^2) t)(J Omega^2 - K t - G c^2) = G^2 R^2 t c^2.
+    With small phi, y = R theta + const and the sideways force G (y' - phi),
+
+        (M Omega^2 - (beta + G R^2) q^2)(J Omega^2 - K q^2 - G) = G^2 R^2 q^2.
+
+    Both Omega^2 are positive, so no wave grows. Rolling at a rate omega adds only x. = -R omega phi, which has no effect on the
+    other equations to first order. For discs of spacing k, t = 4/k^2 sin^2(qk/2) replaces q^2, and c = cos(qk/2) is the symbol of
+    the mean of two headings: (M Omega^2 - (beta + G R^2) t)(J Omega^2 - K t - G c^2) = G^2 R^2 t c^2.
 
     Returns
     -------

@@ -1,18 +1,22 @@
-r"""The rod with headings of its own, by spectral elements: fields to 1e-7 and better.
+"""The steered rod (sections with headings of their own) by spectral elements: fields to 1e-7 and better.
 
-The planar geometrically exact (Simo-Reissner) rod with rolling sections: centre line r, heading phi, roll theta; d_1 = (cos phi,
-sin phi), strains Gamma = T(-phi) r' - (1, 0) (stretch, shear), T the turn by an angle; energies per length
+The planar geometrically exact (Simo-Reissner) rod with rolling sections has centre line r, heading phi and roll angle theta. With
+d_1 = (cos phi, sin phi) and T(a) the rotation by an angle a, the strains are Gamma = T(-phi) r' - (1, 0) (stretch, shear). The
+energies per length are
 
     rho |r.|^2/2 + alpha theta.^2/2 + J phi.^2/2   and   A Gamma_1^2/2 + G Gamma_2^2/2 + beta theta'^2/2 + K phi'^2/2,
 
-rolling r. = e theta., e = R (-sin phi, cos phi). For admissible variations (e psi, psi, chi) d'Alembert's principle reads
+and rolling is r. = e theta., e = R (-sin phi, cos phi). For admissible variations (e psi, psi, chi) d'Alembert's principle reads
 
     int (alpha + rho R^2) theta.. psi + J phi.. chi  =  - int n . (e psi)' + beta theta' psi' + K phi' chi' + (n x r') chi,
 
-n = T(phi) (A Gamma_1, G Gamma_2); its natural ends are e.n + beta theta' = 0 and K phi' = 0. Integrals become Gauss-Lobatto
-sums over elements with polynomials of degree p (weights w, derivative D), for fields and variations alike, so that the nodes'
-inertia is diagonal and the energy of the sums is constant. n . (e psi)' is kept as a force -D^T w n on r, projected on e. Time:
-DOP853 with an error far below that of the elements. This shares nothing with the chain but the equations.
+with n = T(phi) (A Gamma_1, G Gamma_2). The natural end conditions are e.n + beta theta' = 0 and K phi' = 0.
+
+Integrals are replaced by Gauss-Lobatto sums over elements with polynomials of degree p (weights w, derivative D), for fields and
+variations alike. The inertia of the nodes is then diagonal, and the energy of the sums is constant. n . (e psi)' is computed as a
+force -D^T w n on r, projected on e. Time is integrated by DOP853, with an error far below that of the elements.
+
+The method is independent of the chain of discs: it shares only the equations.
 """
 
 from dataclasses import dataclass
@@ -28,13 +32,13 @@ from continuum.rod import Scene, SteeredRod
 from discs.arrays import Float, Int
 
 DEGREE = 10
-MOST_CALLS = 12 * 2**17  # of rates, twelve to a step
-TRIED = 12 * 2**8  # calls that tell how many all of it will take
+MOST_CALLS = 12 * 2**17  # evaluations of the rates, twelve per step
+TRIED = 12 * 2**8  # evaluations after which their total is predicted
 UNKNOWNS = ("x", "y", "theta", "phi", "omega", "phi_rate")
 
 
 def lobatto(p: int) -> tuple[Float, Float, Float]:
-    """Gauss-Lobatto nodes and weights of degree p on [-1, 1], (p+1,), and the derivative of the polynomial through them."""
+    """Gauss-Lobatto nodes and weights on [-1, 1], (p+1,), and the derivative matrix of the polynomial of degree p through them."""
     basis = legendre.Legendre.basis(p)
     x = np.concatenate([[-1.0], np.sort(basis.deriv().roots().real), [1.0]])
     for _ in range(3):  # Newton steps on the inner roots of P_p', to round-off
@@ -53,7 +57,7 @@ def lobatto(p: int) -> tuple[Float, Float, Float]:
 class Elements:
     """A scene of a `SteeredRod` on `count` equal elements of degree `DEGREE`.
 
-    Unknowns are rows (6, n), named by UNKNOWNS, at the n nodes; a closed rod's last node is its first.
+    Unknowns are rows (6, n) at the n nodes, named by UNKNOWNS. The last node of a closed rod is its first.
     """
 
     scene: Scene
@@ -67,7 +71,7 @@ class Elements:
 
     @cached_property
     def _expand(self) -> Float:
-        """Values at an element's nodes to Legendre coefficients, (DEGREE + 1, DEGREE + 1)."""
+        """The matrix from values at the nodes of an element to Legendre coefficients, (DEGREE + 1, DEGREE + 1)."""
         return np.linalg.inv(legendre.legvander(self._rule[0], DEGREE)).astype(np.float64, copy=False)
 
     @cached_property
@@ -91,11 +95,11 @@ class Elements:
 
     @cached_property
     def weights(self) -> Float:
-        """Length that each node stands for, (n,)."""
+        """Share of the length of each node, (n,)."""
         return self._sum(np.broadcast_to(self._rule[1], self._index.shape))
 
     def _sum(self, local: Float) -> Float:
-        """Add values of elements (..., count, DEGREE + 1) up at the nodes, (..., n)."""
+        """Sum of the values of elements (..., count, DEGREE + 1) at the nodes, (..., n)."""
         total = np.empty((*local.shape[:-2], self.n))
         inner = self.n - (not self.scene.closed)
         total[..., :inner] = local[..., :-1].reshape(*local.shape[:-2], -1)
@@ -107,7 +111,7 @@ class Elements:
         return total
 
     def local(self, q: Float) -> Float:
-        """Rows x, y, theta, phi on elements, (4, count, DEGREE + 1); around a closed rod with its shift and turns."""
+        """Rows x, y, theta, phi on elements, (4, count, DEGREE + 1); the last node of a closed rod includes its shift and turns."""
         values = q[:4, self._index]
         if self.scene.closed:
             values[:2, -1, -1] += np.array(self.scene.shift)
@@ -131,7 +135,7 @@ class Elements:
 
     @property
     def _rod(self) -> SteeredRod:
-        assert isinstance(self.scene.rod, SteeredRod)  # solve sends nothing else here
+        assert isinstance(self.scene.rod, SteeredRod)  # `solve` takes this method for no other rod
         return self.scene.rod
 
     def rate(self, _: float, flat: Float) -> Float:
@@ -160,7 +164,7 @@ class Elements:
 
     @cached_property
     def misfit(self) -> dict[str, float]:
-        """Largest distance of the initial fields from their polynomials on the elements, on all pieces where they are smooth."""
+        """Largest difference between the initial fields and their polynomials on the elements, for each field."""
         s, _ = resolve(self.scene).quadrature(POINTS)
         truth = self.scene.fields(s)
         at = s / self.scene.rod.length * self.count
@@ -170,7 +174,7 @@ class Elements:
         return {name: float(np.abs(row - truth[name]).max()) for name, row in zip(UNKNOWNS, found, strict=True)}
 
     def run(self, times: Float, tol: float) -> Float:
-        """The unknowns at the times, (F, 6, n), with an error in time below tol."""
+        """The unknowns at the times, (F, 6, n), with an error of the time steps below tol."""
         calls = 0
 
         def rate(t: float, flat: Float) -> Float:
@@ -191,7 +195,7 @@ class Elements:
         return unknowns
 
     def sample(self, q: Float, cells: int) -> Float:
-        """Rows x, y, theta, phi, theta., phi. of (6, n) at equally spaced places, `cells` of them to an element, (6, places)."""
+        """Rows x, y, theta, phi, theta., phi. of (6, n) at equally spaced places, `cells` in each element, (6, places)."""
         through = legendre.legvander(np.linspace(-1, 1, cells, endpoint=False), DEGREE) @ self._expand
         values = np.concatenate([self.local(q), q[4:, self._index]])
         places = (values @ through.T).reshape(6, -1)

@@ -1,4 +1,4 @@
-"""Exact solutions, of the field and of n discs: breathing rings, the straight rod rolling, its standing waves at rest."""
+"""Exact solutions of the field and of n discs: breathing rings, the straight rod rolling, standing and growing waves."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from discs.chains.rolling import ROLLING, stretching
 
 
 class Ring(NamedTuple):
-    """A breathing ring at times t (F,): radius a (length), roll angle theta and its rate omega, all (F,)."""
+    """A breathing ring at times t (F,): radius a (length), roll angle theta and its rate omega, each (F,)."""
 
     radius: Float
     theta: Float
@@ -24,31 +24,32 @@ class Ring(NamedTuple):
 
 
 def _collapse(a0: float, inward: float, nu: float) -> float:
-    """First time at which a_0 cos(nu t) - inward sin(nu t)/nu is zero."""
+    """The first time at which a_0 cos(nu t) - inward sin(nu t)/nu is zero."""
     if nu > 0:
         return float(np.arctan2(a0 * nu, inward) / nu)
     return a0 / inward if inward > 0 else np.inf
 
 
 def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | None = None) -> Ring:
-    r"""The circle of circumference `rod.length` whose discs all roll at the rate `omega` at t = 0.
+    """The circle of circumference `rod.length` whose discs all roll at the rate `omega` at t = 0.
 
-    With a_0 = length/2 pi, slopes z = |r'| = g a/a_0 and curvature |r''| = b a, where g = 1 and b = 1/a_0^2 for the field,
-    and for n discs of spacing k g = (a_0/k) sin(2 pi/n), b = (4/k^2) sin^2(pi/n), a law of rolling h(z) moves the ring by
-    a. = -R omega |h| and keeps M omega^2/2 + K b^2 a^2/2, M = alpha + rho R^2 |h|^2, so
+    Let a_0 = length/2 pi. The slope is z = |r'| = g a/a_0 and the curvature |r''| = b a. For the field g = 1 and b = 1/a_0^2; for n
+    discs of spacing k, g = (a_0/k) sin(2 pi/n) and b = (4/k^2) sin^2(pi/n). A law of rolling h(z) moves the ring by a. = -R omega
+    |h| and keeps M omega^2/2 + K b^2 a^2/2 with M = alpha + rho R^2 |h|^2. Hence
 
         M omega. = R |h| (rho R^2 |h| |h|' omega^2 g/a_0 + K b^2 a),   |h|' = d|h|/dz,
 
-    integrated to 1e-13. Unit law, |h| = 1: (alpha + rho R^2) a.. = -K R^2 b^2 a, harmonic. Where a = 0 the ring ends as a point.
+    which is integrated to 1e-13. For the unit law |h| = 1, so (alpha + rho R^2) a.. = -K R^2 b^2 a is harmonic and solved in closed
+    form. When a = 0 the ring has collapsed to a point, and the solution ends.
 
     Parameters
     ----------
-    t : times, increasing from t >= 0.
-    n : number of discs, None for the field.
+    t : times, increasing, from t >= 0.
+    n : number of discs; None for the field.
 
     Raises
     ------
-    ValueError : for an unknown law, or times after the ring has become a point.
+    ValueError : for an unknown law, or times after the collapse.
     """
     law = ROLLING[checks.choice("rolling", rolling, ROLLING)]
     t = np.atleast_1d(np.asarray(t, dtype=float))
@@ -62,13 +63,13 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     g = 1.0 if n is None else a0 / k * np.sin(2 * np.pi / n)
     b = 1 / a0**2 if n is None else (2 / k * np.sin(np.pi / n)) ** 2
     r, stiffness = rod.radius, rod.bending_stiffness * b**2
-    if rolling == "unit":  # in closed form
+    if rolling == "unit":  # closed form
         pull = r * stiffness / rod.inertia
         nu = np.sqrt(r * pull)
         end = _collapse(a0, r * omega, nu)
         if t[-1] >= end:
             raise ValueError(f"the ring is a point at t = {end:g}; ask for earlier times")
-        # sin(nu t)/nu, which is t for a rod that does not bend
+        # sin(nu t)/nu, which is t for nu = 0
         sine = t * np.sinc(nu * t / np.pi)
         a = a0 * np.cos(nu * t) - r * omega * sine
         # (a_0 - a)/R, written so that R may be 0
@@ -94,7 +95,7 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
 
 
 class Motion(NamedTuple):
-    """A rod's fields at times t (F,) and places s (N,): x, y (length), theta and its rate omega, all (F, N)."""
+    """The fields of a rod at times t (F,) and places s (N,): x, y (length), theta and its rate omega, each (F, N)."""
 
     x: Float
     y: Float
@@ -103,9 +104,9 @@ class Motion(NamedTuple):
 
 
 def rolling_line(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float) -> Motion:
-    """The straight rod that rolls sideways at a constant rate: r = (s, R omega t), theta = omega t; for discs and both laws alike.
+    """The straight rod rolling sideways at a constant rate: r = (s, R omega t), theta = omega t; for discs and for every law.
 
-    Nothing bends or twists, so (NHFE) leaves omega. = 0 and lambda = mu = 0.
+    Nothing bends or twists, so (NHFE) gives omega. = 0 and lambda = mu = 0.
     """
     s, t, omega = *_axes(s, t), checks.number("omega", omega)
     theta = omega * t + 0 * s
@@ -115,34 +116,36 @@ def rolling_line(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float) -> Motion:
 def standing_wave(
     rod: Rod, s: ArrayLike, t: ArrayLike, mode: int, amplitude: float, closed: bool = False, n: int | None = None
 ) -> Motion:
-    r"""A standing wave of the straight rod at rest: theta = amplitude g(s) cos(Omega t), r = (s, R theta).
+    """A standing wave of the straight rod at rest: theta = amplitude g(s) cos(Omega t), r = (s, R theta).
 
-    Exact at any amplitude if R = 0, when the rod only twists; else to first order in the amplitude, under both laws, which agree
-    there: e = (-R y', R) to first order leaves x = s and y. = R theta.; (NHFE) becomes a beam under tension,
+    It is exact at any amplitude if R = 0, as the rod then only twists. Otherwise it is exact to first order in the amplitude, under
+    every law, because to first order e = (-R y', R), which gives x = s and y. = R theta. (NHFE) becomes a beam under tension,
 
         M theta.. = beta theta'' - K R^2 theta'''',   M = alpha + rho R^2.
 
-    closed : g = cos(q s), q = 2 pi mode/length, M Omega^2 = beta q^2 + K R^2 q^4 (`dispersion.frequency`).
-    free ends : theta'' = 0 and beta theta' = K R^2 theta'''. Of both the wave and what decays from the ends,
+    Closed rod: g = cos(q s), q = 2 pi mode/length, M Omega^2 = beta q^2 + K R^2 q^4 (`dispersion.frequency`).
 
-        g = even: cos(q z)/(q^2 cos(q l/2)) + cosh(p z)/(p^2 cosh(p l/2)),   odd: the same of sin and sinh,   z = s - length/2,
+    Free ends: theta'' = 0 and beta theta' = K R^2 theta'''. With z = s - length/2, g is the sum of a wave and of a part that decays
+    from the ends,
 
-    with M Omega^2 = beta q^2 + K R^2 q^4 = K R^2 p^4 - beta p^2, so p^2 = q^2 + beta/(K R^2), and q the mode-th root of
+        even: g = cos(q z)/(q^2 cos(q l/2)) + cosh(p z)/(p^2 cosh(p l/2)),   odd: the same with sin and sinh,
 
-        even: p^3 tan(q l/2) + q^3 tanh(p l/2) = 0,   odd: q^3 tan(q l/2) = p^3 tanh(p l/2);
+    where M Omega^2 = beta q^2 + K R^2 q^4 = K R^2 p^4 - beta p^2, so p^2 = q^2 + beta/(K R^2), and q is the mode-th root of
 
-    g is scaled to 1 at s = 0. If K R = 0, nothing decays and g = cos(pi mode s/l).
+        even: p^3 tan(q l/2) + q^3 tanh(p l/2) = 0,   odd: q^3 tan(q l/2) = p^3 tanh(p l/2).
 
-    For n discs (plain springs, or a ring) read Q = (4/k^2) sin^2(q k/2), P = (4/k^2) sinh^2(p k/2) for q^2, p^2 and sin(q k)/k,
-    sinh(p k)/k for the single q, p of q^3 = q^4/q: the conditions of an end are that it does not bend, and that the shear forces
-    of the links to its two sides, one of them beyond the end, add up to 0.
+    g is scaled to 1 at s = 0. If K R = 0 there is no decaying part and g = cos(pi mode s/l).
+
+    For n discs (plain springs, or a ring) Q = (4/k^2) sin^2(q k/2), P = (4/k^2) sinh^2(p k/2) replace q^2, p^2, and sin(q k)/k,
+    sinh(p k)/k replace the single q, p in q^3 = q^4/q. The conditions at an end disc are zero bending, and that the shear forces of
+    the links on its two sides, one of them beyond the end, sum to 0.
 
     Parameters
     ----------
-    s : places, (N,); of discs, i k.
+    s : places, (N,); i k for discs.
     t : times, (F,).
-    mode : 1, 2, ...: waves around a closed rod, zeros of theta along a free one.
-    n : number of discs, None for the field.
+    mode : 1, 2, ...: number of waves around a closed rod, number of zeros of theta on a free one.
+    n : number of discs; None for the field.
 
     Raises
     ------
@@ -163,28 +166,28 @@ def standing_wave(
 def growing_wave(
     rod: Rod, s: ArrayLike, t: ArrayLike, omega: float, mode: int, amplitude: float, n: int | None = None, rolling: str = "field"
 ) -> Motion:
-    r"""The growing wave of the straight rod that rolls sideways at the rate omega, to first order in the amplitude.
+    """The growing wave of the straight rod that rolls sideways at the rate omega, to first order in the amplitude.
 
-    Perturb `rolling_line` by (xi, eta, vartheta) e^{sigma t}. Rolling asks for sigma xi = -R omega eta' and
-    sigma eta = R (sigma vartheta + gamma omega xi'), hence with sigma and gamma of `dispersion.growth`, q = 2 pi mode/length and
-    g = R omega q
+    Perturb `rolling_line` by (xi, eta, vartheta) e^{sigma t}. Rolling requires sigma xi = -R omega eta' and
+    sigma eta = R (sigma vartheta + gamma omega xi'). With sigma and gamma of `dispersion.growth`, q = 2 pi mode/length and g = R
+    omega q,
 
         vartheta = a cos(q s),   eta = b cos(q s),   xi = (g/sigma) b sin(q s),   b = R sigma^2/(sigma^2 - gamma g^2) a.
 
-    (Field law, gamma = 1: sigma < g, as the dispersion relation is positive at sigma = g.) For n discs on a ring
-    q -> sin(q k)/k in g.
+    (For the field law, gamma = 1, sigma < g, because the dispersion relation is positive at sigma = g.) For n discs on a ring
+    sin(q k)/k replaces q in g.
 
     Parameters
     ----------
     s, t : places (N,) and times (F,).
-    omega : not zero; without rolling nothing grows.
-    mode : waves around the closed rod, 1, 2, ...
-    n : number of discs, None for the field.
-    rolling : a law with gamma >= 0; others may grow by waves that also travel.
+    omega : rate of roll, not zero; without rolling no wave grows.
+    mode : number of waves around the closed rod, 1, 2, ...
+    n : number of discs; None for the field.
+    rolling : a law with gamma >= 0; for other laws the growing waves may also travel.
 
     Raises
     ------
-    ValueError : for a rod that this wave does not grow on, and for a law with gamma < 0.
+    ValueError : for a rod on which this wave does not grow, and for a law with gamma < 0.
     """
     gamma = stretching(ROLLING[checks.choice("rolling", rolling, ROLLING)])
     if gamma < 0:
@@ -217,14 +220,14 @@ def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, C
     half, odd = length / 2, mode % 2 == 1
 
     def ratios(q: float) -> tuple[float, float, float]:
-        """p, q^2/p^2 and q/p, or what stands for them with n discs."""
+        """p, q^2/p^2 and q/p; with n discs their counterparts."""
         second, first = symbols(q, k)
         square = second + rod.torsion_stiffness / bend
         p = np.sqrt(square) if k is None else 2 / k * np.arcsinh(np.sqrt(square) * k / 2)
         return float(p), float(second / square), float(first / (p if k is None else np.sinh(p * k) / k))
 
     def end(q: float) -> float:
-        """The condition on q, without the poles of tan."""
+        """The condition on q, multiplied by cos(q l/2) to remove the poles of tan."""
         p, second, first = ratios(q)
         sin, cos, tanh = np.sin(q * half), np.cos(q * half), np.tanh(p * half)
         return float(second**2 * sin - first * cos * tanh if odd else first * sin + second**2 * cos * tanh)
@@ -235,7 +238,7 @@ def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, C
     def g(s: Float) -> Float:
         z, sign = s - half, -1.0 if odd else 1.0
         wave = np.sin(q * z) / np.sin(q * half) if odd else np.cos(q * z) / np.cos(q * half)
-        # cosh(p z)/cosh(p l/2), or sinh, safe for large p
+        # cosh(p z)/cosh(p l/2), or sinh, without overflow for large p
         decaying = np.exp(p * (z - half)) + sign * np.exp(-p * (z + half))
         shape: Float = sign * (wave + second * decaying / (1 + sign * np.exp(-p * length))) / (1 + second)
         return shape

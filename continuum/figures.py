@@ -1,4 +1,4 @@
-"""Pictures of the field alone: `python -m continuum.figures docs/images` draws both. Nothing opens a window."""
+"""Figures of the field: `python -m continuum.figures docs/images` draws both. No window is opened."""
 
 import sys
 from dataclasses import replace
@@ -24,10 +24,10 @@ FINE = Suzuki4(Midpoint(tolerance=1e-13))
 
 
 def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, duration: float = 1.0) -> Float:
-    """Growth rates (modes,) of waves 1, 2, ... of n discs that roll sideways at the rate omega, from one simulation.
+    """Growth rates (modes,) of waves 1, 2, ... of n discs that roll sideways at the rate omega, measured in one simulation.
 
-    It starts from all waves at once, small enough to pass through each other: growing ones under the field law, standing ones
-    under the unit law. A wave's size is that of its amplitude and rate, sqrt(|theta_m|^2 + |omega_m|^2/rate^2).
+    The initial state is the sum of all waves, small enough not to interact: growing waves for the field law, standing waves for the
+    unit law. The size of a standing wave is that of amplitude and rate together, sqrt(|theta_m|^2 + |omega_m|^2/rate^2).
     """
     waves, grows = range(1, modes + 1), bool(stretching(ROLLING[rolling]))
 
@@ -35,7 +35,7 @@ def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, du
         line = exact.rolling_line(rod, s, 0.0, omega)
         start = np.array(line)[:, 0]
         for mode in waves:
-            size = 1e-9 / mode  # slopes are alike
+            size = 1e-9 / mode  # equal slopes
             if grows:
                 wave = np.array(exact.growing_wave(rod, s, 0.0, omega, mode, size, n, rolling)) - line
             else:
@@ -56,7 +56,7 @@ def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, du
 
 
 def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: Axes | None = None) -> Axes:
-    """Growth rate against wave number of the straight rolling rod, field and n discs, both laws; measured rates as points."""
+    """Growth rate against wave number of the straight rolling rod: field and n discs, both laws, measured rates as points."""
     ax = Figure(figsize=(6.8, 4.6), layout="constrained").subplots() if ax is None else ax
     most = 2 * np.pi * (modes + 0.5) / rod.length
     q, k = np.linspace(1e-3, most, 400), rod.length / n
@@ -79,7 +79,7 @@ def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: A
 
 
 def fluxes(scene: Scene, n: int = 513, frames: int = 451) -> Figure:
-    """Density of energy and its flux over s and t, from n discs."""
+    """Density and flux of energy over s and t, from n discs."""
     run = simulate(semidiscretise(scene, n, "consistent"), "suzuki4", frames=frames, progress=False)
     law = balances(scene.rod, run, scene.rolling, scene.closed, scene.shift)["energy"]
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")

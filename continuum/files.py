@@ -1,4 +1,4 @@
-"""Scenes from TOML files."""
+"""Scenes in TOML files."""
 
 import inspect
 import tomllib
@@ -11,11 +11,11 @@ from discs import checks
 from discs.chains.twist import PAPER
 from discs.files.safe import opened
 
-LARGEST = 2**14  # bytes of a scene file; a key of many parts, as a.a.a, takes memory as the square of its length
+LARGEST = 2**14  # bytes of a scene file; the memory for a dotted key, as a.a.a, grows with the square of its length
 
 
 def read_scene(path: str | Path) -> Scene:
-    """A scene from a TOML file: `scene` names it, the other keys are its parameters.
+    """Read a scene from a TOML file: the key `scene` gives its name, the other keys are its parameters.
 
         scene = "untwisting_rod"
         rolling = "unit"
@@ -24,7 +24,7 @@ def read_scene(path: str | Path) -> Scene:
 
     Raises
     ------
-    ValueError : if the file cannot be read, or a key or value is not one of the scene's.
+    ValueError : if the file cannot be read, or if a key or value does not belong to the scene.
     """
     with open(opened(path), "rb") as file:
         content = _toml(path, file.read(LARGEST + 1))
@@ -33,15 +33,15 @@ def read_scene(path: str | Path) -> Scene:
             f"the scene file {path} must name its scene, as in scene = {next(iter(SCENES))!r}; its keys are {list(content)}"
         )
     make = SCENES[checks.choice("scene", content.pop("scene"), SCENES)]
-    own = [name for name, p in inspect.signature(make).parameters.items() if p.kind is not p.VAR_KEYWORD]
+    named = [name for name, p in inspect.signature(make).parameters.items() if p.kind is not p.VAR_KEYWORD]
     for key in content:
-        checks.choice(f"key of {make.__name__}", key, (*own, *PAPER, *(LAW if make is not steered_rod else ())))
+        checks.choice(f"key of {make.__name__}", key, (*named, *PAPER, *(LAW if make is not steered_rod else ())))
     return make(**content)
 
 
 def _toml(path: str | Path, content: bytes) -> dict[str, Any]:
     if len(content) > LARGEST:
-        raise ValueError(f"the scene file {path} is larger than {LARGEST} bytes, and a scene takes some hundreds")
+        raise ValueError(f"the scene file {path} is larger than {LARGEST} bytes; a scene needs some hundreds")
     try:
         return tomllib.loads(content.decode())
     except RecursionError:

@@ -1,4 +1,4 @@
-"""The motion of the free rod: `free_rod`. Its equations and its step: `continuum.free_system`."""
+"""The motion of the free rod, `free_rod`; the equations and the step are in `continuum.free_system`."""
 
 import warnings
 
@@ -34,34 +34,37 @@ def free_rod(
 
     Parameters
     ----------
-    rod : the rod; its radius does not matter, as nothing rolls. Linear curvature, which is the true one while |r'| = 1.
-    r0, v0 : places and velocities of the centre line with |r0'| = 1 and r0' . v0' = 0: functions of s (m,) that return (2, m), read
-        between the nodes too, or values at the nodes, (2, n). A frame of an earlier run, (x, y) and (x_rate, y_rate), goes on as
-        that run does.
-    theta0, omega0 : torsion and its rate, functions of s that return (m,), or (n,), or a number.
-    duration : time to move, > 0.
-    n : nodes, at least 3, both ends counted; at least 5 around a ring; at most a million.
-    dt : time step, > 0 and at most the duration. Bending does not limit it; accuracy asks for a part of the shortest period that
-        carries energy.
-    closed : a ring rather than free ends.
-    frames : how many frames, equally spaced, or their times. One between two steps is reached by a shorter step of its own.
+    rod : the rod, with linear curvature, which is the true one while |r'| = 1. The radius has no effect, as nothing rolls.
+    r0, v0 : positions and velocities of the centre line, with |r0'| = 1 and r0' . v0' = 0: functions of s (m,) that return (2, m),
+        evaluated between the nodes too, or values at the nodes, (2, n). A frame of an earlier run, (x, y) and (x_rate, y_rate),
+        continues that run.
+    theta0, omega0 : torsion and its rate: functions of s that return (m,), values (n,), or a number.
+    duration : duration, > 0.
+    n : number of nodes, at least 3 with both ends counted, at least 5 around a ring; at most a million.
+    dt : time step, > 0 and at most the duration. Bending sets no stability limit. For accuracy dt must be a fraction of the
+        shortest period that carries energy.
+    closed : whether the rod is a ring; otherwise its ends are free.
+    frames : number of frames, equally spaced, or their times. A frame between two steps is computed by a shorter step of its own.
     progress : show progress on anything that takes over a second.
-    estimate : a second run, half the nodes and twice the step, gives `error_estimate`; it takes up to half as long as the first.
+    estimate : whether to compute `error_estimate`, by a second run on half the nodes with twice the step. It takes up to half as
+        long as the first run.
 
     Returns
     -------
-    Solution with x_rate, y_rate and `tension`, p in the links, (F, n - 1), or (F, n) around a ring; `error_estimate` of x, y,
-    theta, omega, x_rate, y_rate and tension, of space and time together.
+    Solution with x_rate, y_rate and `tension`, p in the links, (F, n - 1), or (F, n) around a ring. `error_estimate` has the errors
+    of x, y, theta, omega, x_rate, y_rate and tension, due to space and time together.
 
-    Warnings say where the energy of the centre line, which the motion keeps, is off by a hundredth, with a dt that would do; where
-    an estimate is above a twentieth of the quantity's largest value (of the length, for x and y) or could not be had; and where a
-    line that starts bent at a free end leaves velocities or tension without a limit.
+    A warning is given
+
+    * if the energy of the centre line, which the motion conserves, changes by a hundredth; it suggests a dt;
+    * if an estimated error is above a twentieth of the largest value of the quantity (of the length, for x and y), or unknown;
+    * if the line is bent at a free end at the start, so that velocities or tension have no limit as n grows.
 
     Raises
     ------
-    ValueError : for bad input, a centre line or velocity that stretches the rod.
-    SimulationError : when a step cannot be solved, turns a link by over a right angle, or lifts the energy of the centre line above
-        ten times that of the start: take a smaller one.
+    ValueError : for bad input, or a centre line or velocity that stretches the rod.
+    SimulationError : if a step cannot be solved, turns a link by more than a right angle, or raises the energy of the centre line
+        above ten times its initial value. The cure is a smaller dt.
     """
     if not isinstance(rod, Rod) or rod.curvature != "linear":
         raise ValueError(f"free_rod needs a Rod with curvature='linear'; got {rod!r}")

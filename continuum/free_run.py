@@ -1,4 +1,4 @@
-"""Runs of the free rod, watched by their energy, and how far they are off by a coarser one."""
+"""Runs of the free rod: checks of the steps by their energy, and error estimates from a coarser run."""
 
 from typing import NamedTuple
 
@@ -14,11 +14,11 @@ from discs.arrays import Float
 from discs.chains.chain import FEWEST
 from discs.simulation import ENERGY_DRIFT_WARNING
 
-TURN = 0.08  # rad: of the fastest link in a step; energy was kept to 1 % with it in all 43 random cases that were off
-BLOWN_UP = 10.0  # times the energy of the start
-SAID = 0.05  # of a quantity's largest value: an estimate that is warned of
+TURN = 0.08  # rad per step of the fastest link; it kept the energy to 1 % in all 43 random cases that had been inaccurate
+BLOWN_UP = 10.0  # times the initial energy
+SAID = 0.05  # relative; estimates above it give a warning
 ROUNDING = 1e-9  # relative
-APART = 8  # steps of the coarser run between the frames that are compared
+APART = 8  # steps of the coarser run between compared frames
 
 Start = tuple[Given, Given, Given, Given]  # r, v, theta, omega
 Errors = dict[str, float]
@@ -29,8 +29,8 @@ class Run(NamedTuple):
 
     fields : x, y, theta, omega, x_rate, y_rate (F, n) and tension (F, n_links).
     energy : (F,).
-    steps : whole steps taken.
-    off : what to warn of: energy that is not what it was; empty where it is.
+    steps : number of whole steps taken.
+    off : warning if the energy was not conserved; empty otherwise.
     """
 
     fields: dict[str, Float]
@@ -40,17 +40,17 @@ class Run(NamedTuple):
 
 
 def nodes(rod: Rod, n: int, ring: bool) -> Chain:
-    """The free rod's nodes."""
+    """The nodes of the free rod, as a chain."""
     names = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness")
     return Chain(n=n, radius=0.0, ends="ring" if ring else "springs", **{name: getattr(rod, name) for name in names})
 
 
 class Watch:
-    """Whether steps are short enough.
+    """Checks that steps are short enough.
 
-    The motion keeps three energies: of the centre line about its centre of mass, of that centre, and of theta. Steps keep the last
-    two to rounding; the first tells. A link that turns by over a right angle in a step may have taken the other of the two ways to
-    have its length.
+    The motion conserves three energies: that of the centre line about its centre of mass, that of the centre of mass, and that of
+    theta. Steps conserve the last two to rounding, so the first one is checked. A link of fixed length can be solved for in two
+    directions. A link that turns by more than a right angle in a step may have taken the wrong one.
     """
 
     def __init__(self, system: FreeRod, chain: Chain, z: State, h: float) -> None:
@@ -63,12 +63,12 @@ class Watch:
         self._k = chain.k
 
     def _noise(self, z: State, step: int) -> float:
-        """Energy by rounding of places, whose second differences bend, and velocities, of all steps."""
+        """The energy due to rounding of positions (whose second differences bend) and velocities, in all steps so far."""
         r, v = (100 * np.finfo(float).eps * float(np.abs(values).max()) for values in (z.r, z.v))
         return step * (self._stiff * (r / self._k**2) ** 2 + self._heavy * v**2)
 
     def __call__(self, before: State, after: State, step: int, time: float) -> None:
-        """SimulationError if the way from one state to the next, at a time, is none."""
+        """Raise SimulationError if the step from one state to the next, at a time, is wrong."""
         turns = np.abs(self._system.turns(before.r, after.r))
         link = int(np.argmax(turns))
         if not turns[link] <= np.pi / 2:
@@ -96,7 +96,7 @@ class Watch:
             self._off, self._worst, self._when = off, energy, time
 
     def said(self) -> str:
-        """What to warn of; empty where all is well."""
+        """The warning about the energy; empty if it was conserved."""
         if self._off <= ENERGY_DRIFT_WARNING * self._energy:
             return ""
         enough = min(self._h / 2, self._h * np.sqrt(0.5 * ENERGY_DRIFT_WARNING * self._energy / self._off), TURN / self._rate)
@@ -107,7 +107,7 @@ class Watch:
 
 
 def run(chain: Chain, start: Start, h: float, times: Float, bar: tqdm) -> Run:
-    """The motion at times, in steps h."""
+    """The motion at the given times, in steps h."""
     r, v, theta, omega = (given.at(chain.s) if given.nodes.shape[1] != chain.n else given.nodes for given in start)
     system = FreeRod(chain, r)
     try:
@@ -142,13 +142,14 @@ def run(chain: Chain, start: Start, h: float, times: Float, bar: tqdm) -> Run:
 
 
 def compare(rod: Rod, chain: Chain, start: Start, h: float, times: Float, fine: Run, bar: tqdm) -> tuple[Errors | None, str]:
-    """Estimated errors of a run by name, and what to warn of.
+    """Estimated errors of a run by name, and a warning (empty if there is none).
 
-    A run on half the nodes in twice the step is off by four times as much, as both orders are two: the error is a third of the
-    difference |u_{2k,2h} - u_{k,h}|. Half of it is taken, for safety; and where it is a tenth of the quantity or more, so that the
-    orders are not reached, all of it, in between in proportion. It is the largest over the coarser nodes and the frames that are
-    steps of the coarser run or `APART` of its steps from the last one. A run of less than two steps is held against half the step,
-    whose part of the difference is 3/4 of the error.
+    Both orders are two, so a run with half the nodes and twice the step has four times the error, and the error of the finer run is
+    a third of the difference |u_{2k,2h} - u_{k,h}|. For safety half of the difference is taken. If the difference is a tenth of the
+    quantity or more, the orders are not reached, and all of the difference is taken; below a tenth the factor is interpolated. The
+    estimate is the largest over the coarser nodes and over the frames that are steps of the coarser run, or that are at least
+    `APART` of its steps after the last frame compared. A run of less than two steps is compared with one of half the step; the part
+    of the difference due to time is then 3/4 of the error.
     """
     ring = chain.ends == "ring"
     half = chain.n // 2 if ring else (chain.n + 1) // 2
@@ -174,22 +175,23 @@ def compare(rod: Rod, chain: Chain, start: Start, h: float, times: Float, fine: 
     for name, values in other.fields.items():
         half_link = 0.5 * (name == "tension")
         places = coarse.s[: values.shape[1]] + half_link * coarse.k
-        own = through(chain, fine.fields[name][at], offset=half_link * chain.k)(places)
-        apart, scale = float(np.abs(values - own).max()), scales[name]
+        finer = through(chain, fine.fields[name][at], offset=half_link * chain.k)(places)
+        apart, scale = float(np.abs(values - finer).max()), scales[name]
         unresolved = min(1.0, apart / max(0.1 * scale, 1e-300))
         errors[name] = apart * (4 / 3 if short else (1 + unresolved) / 2)
         if errors[name] > SAID * scale + rounding[name]:
             bad.append(f"{name} {errors[name]:.2g}" + (f" ({100 * errors[name] / scale:.0f} %)" if scale else ""))
     if not bad:
         return errors, ""
-    finer = f"n = {2 * chain.n} and dt = {h / 2:g}"
-    return errors, f"free_rod: estimated errors: {', '.join(bad)}; take more nodes and a smaller dt, to begin with {finer}"
+    advice = f"take more nodes and a smaller dt, to begin with n = {2 * chain.n} and dt = {h / 2:g}"
+    return errors, f"free_rod: estimated errors: {', '.join(bad)}; {advice}"
 
 
 def _scales(rod: Rod, chain: Chain, fields: dict[str, Float]) -> tuple[dict[str, float], dict[str, float]]:
-    """What errors are held against, by name, and what rounding may leave.
+    """The scales that errors are compared with, by name, and the errors that rounding may cause.
 
-    The first is the length, the largest speed about the mean, the range of theta and of omega along the rod, the largest tension.
+    The scales are the length, the largest speed relative to the mean, the ranges of theta and of omega along the rod, and the
+    largest tension.
     """
     large = {name: float(np.abs(values).max()) for name, values in fields.items()}
     place, speed = max(large["x"], large["y"]), max(large["x_rate"], large["y_rate"])
@@ -198,7 +200,7 @@ def _scales(rod: Rod, chain: Chain, fields: dict[str, Float]) -> tuple[dict[str,
     scales |= {name: float(np.ptp(fields[name], axis=1).max()) for name in ("theta", "omega")}
     swings = speed + place * np.sqrt(rod.bending_stiffness / rod.density) / rod.length**2
     twists = large["omega"] + large["theta"] * np.sqrt(rod.torsion_stiffness / rod.spin_inertia) / rod.length
-    pulls = rod.bending_stiffness * (1 / rod.length**2 + 1e-5 * place / chain.k**3)  # by third differences
+    pulls = rod.bending_stiffness * (1 / rod.length**2 + 1e-5 * place / chain.k**3)  # from third differences
     rounding = {
         "x": place,
         "y": place,

@@ -1,14 +1,15 @@
-r"""Initial data of the free rod, held against |r'| = 1 and r'.v' = 0 between the nodes too.
+"""Initial data of the free rod: checks of |r'| = 1 and r'.v' = 0, between the nodes too.
 
-**Functions of s** are read at the nodes, and at 13 Gauss-Lobatto places of every link, which give their derivatives: |r'| is
-measured, not the chord of a link, which lacks psi^2/24 of an arc that turns by psi. A kink at a node shows as two values of r'.
+**Functions of s** are evaluated at the nodes and at 13 Gauss-Lobatto points of every link, which give their derivatives. So |r'| is
+measured, not the chord of a link, which is shorter than the arc by psi^2/24 if the arc turns by psi. A kink at a node shows as two
+different values of r'.
 
-**Arrays** hold the nodes alone. Three kinds are taken:
+**Arrays** have values at the nodes only. Three kinds are accepted:
 
-* nodes of a line: |r'| = 1 and r'.v' = 0 by splines of degree 7; one two degrees lower tells how far they are known;
-* links of length k: |d| = k, and for the velocity d.Lv = 0;
-* a frame of an earlier run: d.Lv = 0 to rounding, where a sampled velocity leaves k^2 r''.v''/12. Its links keep the lengths that
-  they had at that run's start, at most k.
+* nodes of a line: |r'| = 1 and r'.v' = 0 hold for splines of degree 7; the difference to splines of degree 5 is their uncertainty;
+* links of length k: |d| = k, and d.Lv = 0 for the velocity;
+* a frame of an earlier run: d.Lv = 0 to rounding, where a sampled velocity has k^2 r''.v''/12. Its links have the lengths that they
+  had at the start of that run, at most k.
 """
 
 from collections.abc import Callable
@@ -23,19 +24,19 @@ from discs.arrays import Float, Spline
 from discs.chains import stencils
 
 Data = Callable[[Float], ArrayLike] | ArrayLike
-STRAIN = 1e-6  # what | |r'| - 1 | and r'.v', beside the largest |v'|, may be by rounding of the user's
-UNKNOWN = 5e-4  # what they may be besides where arrays leave them open
-SHORT = 0.05  # of k: what links of an earlier run may lack, the chord of one radian
-KINK = 0.1  # rad: what the turn at a node of an array may differ by from the mean of its neighbours'
-BENT = 0.05  # rad: curvature of a free end times the length that is warned of
+STRAIN = 1e-6  # tolerance of | |r'| - 1 | and, relative to the largest |v'|, of r'.v', for the user's rounding
+UNKNOWN = 5e-4  # largest additional tolerance for the uncertainty of arrays
+SHORT = 0.05  # of k: links of an earlier run may be shorter by this, as the chord of one radian is
+KINK = 0.1  # rad: largest difference of the turn at a node of an array from the mean of its neighbours
+BENT = 0.05  # rad: curvature of a free end times the length, above which a warning is given
 DEGREE = 7  # of splines through nodes
 X, _, D = lobatto(12)
-MIDDLE = slice(X.size // 2, X.size // 2 + 1)  # of a link, where splines through nodes are best
+MIDDLE = slice(X.size // 2, X.size // 2 + 1)  # of a link, where splines through nodes are most accurate
 ULPS = 1000 * np.finfo(float).eps
 
 
 class Given:
-    """What was given for a quantity of the rod: a function of s, or its values at the nodes.
+    """The data for one quantity of the rod: a function of s, or values at the nodes.
 
     Parameters
     ----------
@@ -47,8 +48,8 @@ class Given:
     Attributes
     ----------
     call : the function, or None.
-    nodes : (rows, n).
-    rounding : what rounding of the values may leave of a derivative.
+    nodes : (rows, n), the values at the nodes.
+    rounding : the error of a derivative that rounding of the values may cause.
     """
 
     def __init__(self, name: str, data: Data, rows: int, chain: Chain) -> None:
@@ -65,18 +66,18 @@ class Given:
         except ValueError:  # x and y of unequal lengths
             shape = ", ".join(str(np.shape(row)) for row in values)  # type: ignore[union-attr]
         if shape != str((2, size)):
-            asked = f" where s has shape ({size},): it is read between the nodes too" if self.call else ""
+            asked = f" where s has shape ({size},): it is evaluated between the nodes too" if self.call else ""
             raise ValueError(f"{self.name} must give x and y, an array of shape {(2, size)}{asked}; got shape {shape}")
         return np.array([checks.field(self.name, row, size) for row in values])  # type: ignore[union-attr]
 
     def at(self, s: Float, degree: int = DEGREE) -> Float:
-        """Values at places s, (rows, s.size), of an array by a spline."""
+        """Values at places s, (rows, s.size); those of an array by a spline."""
         if self.call is not None:
             return self._read(self.call(s), s.size)
         return through(self._chain, self.nodes, degree)(s)
 
     def slopes(self, places: Float) -> tuple[Float, Float]:
-        """d/ds at the places of each link, (2, n_links, 13), and how far an array leaves it open, (n_links, 13)."""
+        """d/ds at the places of each link, (2, n_links, 13), and its uncertainty, (n_links, 13), which is not zero for arrays."""
         if self.call is None:
             slope, lower = (through(self._chain, self.nodes, g).derivative()(places) for g in (DEGREE, DEGREE - 2))
             return slope, np.hypot(*(slope - lower))
@@ -89,7 +90,7 @@ class Given:
 
 
 def through(chain: Chain, values: Float, degree: int = DEGREE, offset: float = 0.0) -> Spline:
-    """Spline through values (..., n) at nodes, or (..., n_links) at places `offset` after them; periodic around a ring."""
+    """Spline through values (..., n) at the nodes, or (..., n_links) at `offset` after them; periodic around a ring."""
     s = chain.s[: values.shape[-1]] + offset
     if chain.ends == "ring":
         s = np.concatenate([s - chain.length, s, s + chain.length])
@@ -100,7 +101,7 @@ def through(chain: Chain, values: Float, degree: int = DEGREE, offset: float = 0
 
 
 def check(chain: Chain, r: Given, v: Given) -> str:
-    """What to warn of; ValueError where the line or its velocity is stretched, not closed or not smooth, naming the place."""
+    """The warning about the initial data, or "". ValueError if the line or its velocity is stretched, not closed or not smooth."""
     if chain.ends == "ring":
         _closed(chain, r)
         _closed(chain, v)
@@ -131,7 +132,7 @@ def check(chain: Chain, r: Given, v: Given) -> str:
 
 
 def _line(chain: Chain, r: Given, places: Float, dr: Float, doubt: Float) -> None:
-    """Refuse a line that is stretched or has a kink."""
+    """Raise ValueError if the line is stretched or has a kink."""
     length, allowed = np.hypot(*dr), STRAIN + r.rounding + np.minimum(doubt, UNKNOWN)
     off = np.abs(length - 1)
     if r.call is None and np.abs(np.hypot(*r.links()) - 1).max() <= STRAIN + r.rounding:
@@ -163,7 +164,7 @@ def _line(chain: Chain, r: Given, places: Float, dr: Float, doubt: Float) -> Non
 
 
 def _closed(chain: Chain, given: Given) -> None:
-    """Refuse a function that is not the same at both ends of a ring; arrays show it in their closing link."""
+    """Raise ValueError if a function differs at the two ends of a ring. For arrays the closing link shows this."""
     if given.call is None:
         return
     ends = given.at(np.array([0.0, chain.length]))
@@ -177,7 +178,7 @@ def _closed(chain: Chain, given: Given) -> None:
 
 
 def _of_earlier_run(chain: Chain, r: Given, v: Given) -> bool:
-    """Whether arrays are a frame of an earlier run: its velocity keeps the links, and not the line, to rounding."""
+    """Whether arrays are a frame of an earlier run: its velocity preserves the links to rounding, but not the line."""
     d, rate = r.links(), v.links()
     chord, speed = np.hypot(*d), float(np.abs(rate).max())
     rounding = 1e-10 * speed + v.rounding + r.rounding * speed
@@ -189,17 +190,17 @@ def _of_earlier_run(chain: Chain, r: Given, v: Given) -> bool:
 
 
 def _bent_ends(chain: Chain, r: Given) -> str:
-    """What to warn of where a free end starts with curvature kappa or with kappa'; empty where none does.
+    """A warning if a free end starts with curvature kappa or with kappa'; otherwise empty.
 
-    The missing condition leaves waves of size q^-3 (kappa) or q^-4 (kappa') in r, and q^2 times that in v: with kappa the sum of
-    the velocities has no limit, with either that of the tension.
+    Free ends have neither. Their initial values send out waves of size q^-3 (kappa) or q^-4 (kappa') in r, and q^2 times that in v.
+    With kappa the sum of the velocities has no limit; with either the sum of the tension has none.
     """
     wide = max(chain.k, chain.length / 32)
     rounding = ULPS * float(np.abs(r.nodes).max()) / wide * np.array([1e2 / wide, 1e5 / wide**2])
     for end, inwards in ((0.0, 1.0), (chain.length, -1.0)):
 
         def ends(degree: int, end: float = end, inwards: float = inwards) -> Float:
-            """kappa and kappa' there."""
+            """kappa and kappa' at the end."""
             values = r.at(end + inwards * wide * (X + 1) / 2, degree)
             values, d = values - values[:, :1], D.T * (2 * inwards / wide)
             first, second, third = ((values @ np.linalg.matrix_power(d, m))[:, 0] for m in (1, 2, 3))
@@ -215,8 +216,8 @@ def _bent_ends(chain: Chain, r: Given) -> str:
         ):
             if bent:
                 return (
-                    f"r0 has the {name} {bent:.3g} at s = {end:g}, where a free end has none: its places are right, but the {lost} "
-                    "no limit of many nodes; start with a line that is straight near free ends"
+                    f"r0 has the {name} {bent:.3g} at s = {end:g}, where a free end has none: positions are right, but the {lost} "
+                    "no limit for many nodes; start with a line that is straight near free ends"
                 )
     return ""
 

@@ -1,30 +1,31 @@
-r"""The free rod: the planar Cosserat rod before it rolls, inextensible, (freeFE) and (constrinext).
+"""The free rod: the planar inextensible Cosserat rod without rolling, (freeFE) and (constrinext).
 
-    rho r.. + K r'''' = (p r')',   alpha theta.. = beta theta'',   |r'| = 1;
+    rho r.. + K r'''' = (p r')',   alpha theta.. = beta theta'',   |r'| = 1.
 
-the tension p is the multiplier of |r'| = 1. Free ends: p r' - K r''' = 0 and r'' = theta' = 0, hence also p = K r''' . r' = 0.
+The tension p is the multiplier of |r'| = 1. Free ends: p r' - K r''' = 0 and r'' = theta' = 0, hence also p = K r''' . r' = 0.
 
-**In s.** Nodes of share w, links d = r_{i+1} - r_i = (L r)_i, each with the length l that it has at the start, k up to the k^2
-of a chord. The Lagrangian (roddensity) becomes
+**In s.** Nodes have shares w. Links d = r_{i+1} - r_i = (L r)_i keep their initial length l, which is k up to the k^2 of a chord.
+The Lagrangian (roddensity) becomes
 
     sum_nodes w (rho |v|^2 + alpha omega^2)/2 - r.S r/2 - theta.S_t theta/2 - sum_links k p/2 (|d|^2 - l^2)/k^2,
 
-S and S_t of plain springs, whose ends are natural here. With M = rho w and the force L^T (p d/k) of the tension,
+with S and S_t of plain springs, whose ends are the natural ones here. With M = rho w and the force L^T (p d/k) of the tension,
 
-    M r.. = -S r - L^T (p d/k),   |d| = l,   and d.L r.. + |L v|^2 = 0 gives p, one tridiagonal system:
+    M r.. = -S r - L^T (p d/k),   |d| = l,   and d.L r.. + |L v|^2 = 0 gives p, by one tridiagonal system:
 
     d . L M^{-1} L^T (p d/k) = |L v|^2 - d . L M^{-1} S r.                                                                 (tension)
 
-**In t.** The variational integrator of L_h = h T(u/h) - h V((r_n + r_{n+1})/2), u = r_{n+1} - r_n, under the constraint at every
-step: the midpoint rule in bending, RATTLE in the constraint,
+**In t.** The variational integrator of L_h = h T(u/h) - h V((r_n + r_{n+1})/2), u = r_{n+1} - r_n, with the constraint at every
+step: the midpoint rule for bending, RATTLE for the constraint,
 
     M u/h = M v_n - h/2 S (r_n + u/2) - L^T (mu d_n)/h,               |L (r_n + u)| = l,
     M v_{n+1} = M u/h - h/2 S (r_n + u/2) - L^T (nu d_{n+1}),         d_{n+1} . L v_{n+1} = 0.
 
-Newton's method on the first line, in u and mu at once, is banded; nu is tridiagonal. The step is symplectic and reversible, of
-order 2, and bending does not limit it. Momentum and angular momentum are kept to rounding, as L_h has their symmetries, and so
-are the lengths, which are solved for. The energy is exact for theta and for small waves; that of the centre line swings by O(h^2),
-and stays within that swing only while h is short beside the periods that carry energy (docs/continuum.md has a table).
+The first line is solved for u and mu together by Newton's method, with banded matrices. The system for nu is tridiagonal. The step
+is symplectic, reversible and of order 2, and bending does not limit it. Momentum and angular momentum are conserved to rounding,
+because L_h has these symmetries. So are the lengths, which are solved for. The energy is exact for theta and for small waves. The
+energy of the centre line oscillates by O(h^2), as long as h is short compared with the periods that carry energy
+(docs/continuum.md has a table).
 """
 
 from typing import NamedTuple
@@ -43,7 +44,7 @@ MOST_SWEEPS = 30
 
 
 class State(NamedTuple):
-    """Places and velocities (2, n), torsion and its rate (n,)."""
+    """Positions and velocities (2, n), torsion and its rate (n,)."""
 
     r: Float
     v: Float
@@ -52,7 +53,7 @@ class State(NamedTuple):
 
 
 class Banded:
-    """Solves systems whose entries stand at fixed places, few places from the diagonal in a given order of the unknowns."""
+    """Solver for sparse systems with a fixed pattern, which is banded in a given order of the unknowns."""
 
     def __init__(self, places: list[tuple[Int, Int]], order: Int) -> None:
         place = np.argsort(order)
@@ -70,28 +71,28 @@ class Banded:
 
 
 class FreeRod:
-    """The semidiscrete free rod and its step. Places and velocities are (2, n), tensions (n_links,).
+    """The semidiscrete free rod and its step. Positions and velocities are (2, n), tensions (n_links,).
 
     Parameters
     ----------
-    chain : plain springs or a ring; its rolling and its radius do not matter.
-    r : (2, n), places that give the links their lengths.
+    chain : plain springs or a ring; its law of rolling and its radius have no effect.
+    r : (2, n), positions that define the lengths of the links.
 
     Attributes
     ----------
-    length : (n_links,), of the links.
+    length : (n_links,), lengths of the links.
     """
 
     def __init__(self, chain: Chain, r: Float) -> None:
         n, self._ends, self._k = chain.n, chain.ends, chain.k
         self.length = np.hypot(*self.links(r))
-        here = np.arange(n - (chain.ends != "ring"))  # links: the i-th joins nodes i and i + 1
+        here = np.arange(n - (chain.ends != "ring"))  # link i joins nodes i and i + 1
         self._mass, self._spin = (chain.w * np.asarray(values, np.float64) for values in (chain.density, chain.spin_inertia))
         self._first, self._second = here, (here + 1) % n
         self._springs = LinearCurvature(chain)
         bending, torsion = self._springs.hessians()
         order = folded(n) if chain.ends == "ring" else np.arange(n)
-        # Newton's unknowns (x, y, mu), those of a node and its link beside each other
+        # unknowns of Newton's method (x, y, mu), ordered so that those of a node and its link are neighbours
         bends, nodes = sp.coo_array(bending), np.arange(2 * n)
         self._bends = np.tile(bends.data, 2)
         tips = [(2 * n + here, tip + a * n) for a in (0, 1) for tip in (self._first, self._second)]
@@ -99,7 +100,7 @@ class FreeRod:
         places += [(node, link) for link, node in tips] + tips
         stacked = (order[:, None] + n * np.arange(3)).ravel()
         self._newton = Banded(places, stacked[stacked < 2 * n + here.size])
-        # L M^{-1} L^T couples a link with the next one, which starts where it ends
+        # L M^{-1} L^T couples neighbouring links
         self._pairs = a, b = (here, (here + 1) % n) if chain.ends == "ring" else (here[:-1], here[1:])
         self._triangle = Banded([(here, here), (a, b), (b, a)], order[order < here.size])
         twists, nodes = sp.coo_array(torsion), np.arange(n)
@@ -130,7 +131,7 @@ class FreeRod:
         return self._triangle(np.concatenate([diagonal, beside, beside]), right)
 
     def admissible(self, r: Float, v: Float) -> Float:
-        """The velocity nearest to v, weighed by mass, that changes no link's length."""
+        """The velocity nearest to v, in the norm of the mass, that changes the length of no link."""
         d = self.links(r)
         return v - self.pull(d, self._constrain(d, (d * self.links(v)).sum(axis=0))) / self._mass
 
@@ -146,26 +147,26 @@ class FreeRod:
         return 0.5 * float(kinetic) + self._springs.potential(self.links(np.array([*z.r, z.theta])))
 
     def line_energy(self, z: State) -> float:
-        """Energy of the centre line about its centre of mass: kept by the motion, as momentum and the energy of theta are."""
+        """Energy of the centre line about its centre of mass; conserved, because momentum and the energy of theta are."""
         v = z.v - (self._mass * z.v).sum(axis=1, keepdims=True) / self._mass.sum()
         return self.energy(State(z.r, v, np.zeros_like(z.theta), np.zeros_like(z.omega)))
 
     def turns(self, before: Float, after: Float) -> Float:
-        """Angles by which links turn between two places r, (n_links,)."""
+        """Angles by which links turn between two positions r, (n_links,)."""
         a, b = self.links(before), self.links(after)
         turns: Float = np.arctan2(a[0] * b[1] - a[1] * b[0], (a * b).sum(axis=0))
         return turns
 
     def rate(self, z: State) -> float:
-        """The fastest turn of a link, rad per time."""
+        """The fastest turning rate of a link, rad per time."""
         return float((np.hypot(*self.links(z.v)) / self.length).max())
 
     def advance(self, z: State, h: float) -> State:
-        """The state after a step h; LinAlgError if Newton's method does not converge."""
+        """The state after a step h. LinAlgError if Newton's method does not converge."""
         return State(*self.step(z.r, z.v, h), *self.twist(z.theta, z.omega, h))
 
     def step(self, r: Float, v: Float, h: float) -> tuple[Float, Float]:
-        """Places and velocities after a step h; LinAlgError if Newton's method does not converge."""
+        """Positions and velocities after a step h. LinAlgError if Newton's method does not converge."""
         n, d, bent = r.shape[1], self.links(r), self.bent(r)
         u, mu = h * v, np.zeros(self.length.size)
         for _ in range(MOST_SWEEPS):
@@ -176,13 +177,13 @@ class FreeRod:
             entries = [0.25 * h * h * self._bends, np.tile(self._mass, 2), *tips]
             change = self._newton(np.concatenate(entries), -np.concatenate([push.ravel(), stretch]))
             u, mu = u + change[: 2 * n].reshape(2, n), mu + change[2 * n :]
-            if np.abs(change[: 2 * n]).max() <= 1e-9 * self._k:  # the next change would be its square
+            if np.abs(change[: 2 * n]).max() <= 1e-9 * self._k:  # quadratic convergence: the next change would be its square
                 moved = r + u
                 return moved, self.admissible(moved, u / h - 0.5 * h * (bent + 0.5 * self.bent(u)) / self._mass)
         raise LinAlgError("Newton's method does not converge")
 
     def twist(self, theta: Float, omega: Float, h: float) -> tuple[Float, Float]:
-        """theta and omega after a step h of the midpoint rule, which owes nothing to the centre line."""
+        """theta and omega after a step h of the midpoint rule; they do not depend on the centre line."""
         still, entries = np.zeros_like(theta), np.concatenate([0.25 * h * h * self._twists, self._spin])
         mean = self._roll(entries, self._spin * omega - 0.5 * h * self.gradient(still, still, theta)[2])
         return theta + h * mean, 2 * mean - omega

@@ -1,4 +1,4 @@
-"""The functions that a field is made of: polynomials between free ends, Fourier series on a closed rod."""
+"""The basis functions of a field: polynomials between free ends, Fourier series on a closed rod."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -12,7 +12,7 @@ from continuum.density import Density
 from continuum.elements import lobatto
 from discs.arrays import Float
 
-FINER = 1.5  # points a node: products of three polynomials are integrated exactly
+FINER = 1.5  # points per node: products of three polynomials are integrated exactly
 
 Coefficients: TypeAlias = NDArray[np.floating]  # of polynomials, as NumPy's stubs have them
 
@@ -24,17 +24,17 @@ class Derivatives(Protocol):
 
 
 class Functions(NamedTuple):
-    """n functions of s, for the line by coefficients, for roll and its rate by values at nodes.
+    """n functions of s. The line is given by coefficients, roll and its rate by values at nodes.
 
-    s, w : (n,), nodes and the lengths they stand for.
-    bends : (n + 3 F, n), coefficients to z at the nodes, then to z, z', z'' at F finer points (less a closed rod's shift), both of
-        the headings: the highest functions are left out by `smooth`.
-    rates : (3 F, n), values at the nodes to the field and its two derivatives at the finer points.
-    project : (n, F + n), f'' at the finer points and f at the nodes to the coefficients of P f.
-    bending : (n,), int |r''|^2 is the sum of this times |coefficient|^2. torsion : (n, n), of int theta'^2.
-    line : places (S,) to the matrix (S, n) that takes coefficients there.
+    s, w : (n,), the nodes and their shares of the length.
+    bends : (n + 3 F, n), from coefficients to z at the nodes, then to z, z', z'' at F finer points (less the shift of a closed
+        rod). They are for headings: the highest functions are damped by `smooth`.
+    rates : (3 F, n), from values at the nodes to the field and its two derivatives at the finer points.
+    project : (n, F + n), from f'' at the finer points and f at the nodes to the coefficients of P f.
+    bending : (n,); int |r''|^2 is the sum of this times |coefficient|^2. torsion : (n, n), the matrix of int theta'^2.
+    line : from places (S,) to the matrix (S, n) that takes coefficients to values there.
     field : see `Derivatives`.
-    ends : how many of the first coefficients are r at the ends.
+    ends : number of leading coefficients that are r at the ends.
     """
 
     s: Float
@@ -50,22 +50,23 @@ class Functions(NamedTuple):
 
 
 def smooth(order: Float) -> Float:
-    """Factors that leave the highest functions out of headings, for order/highest in [0, 1]: exp(-36 order^16).
+    """Factors that remove the highest functions from headings, for order/highest in [0, 1]: exp(-36 order^16).
 
-    A line that moves by r. = i R omega r' alone moves like the Cauchy-Riemann equations: a wave of number q grows at the
-    rate R omega q. What stops it is bending, through changes of omega. The highest functions of r are beyond its reach, as
-    e omega would need still higher ones, and must not turn headings. (A steeper end, as exp(-36 order^36) of Hou and Li, 2007,
-    leaves neighbouring functions with unequal factors, and some growth.)
+    The motion r. = i R omega r' alone is like the Cauchy-Riemann equations: a wave of number q grows at the rate R omega q. Bending
+    stops the growth, by changes of omega. For the highest functions of r this fails, because e omega would need still higher ones.
+    So the highest functions must not affect headings. (A steeper factor, as exp(-36 order^36) of Hou and Li, 2007, gives
+    neighbouring functions unequal factors, and some growth remains.)
     """
     return np.exp(-36.0 * order**16)
 
 
 @lru_cache(maxsize=16)
 def polynomials(n: int, density: Density) -> Functions:
-    """Polynomials of degree n - 1 in the density's coordinate xi, between free ends.
+    """Polynomials of degree n - 1 in the coordinate xi of the density, between free ends.
 
-    Coefficients of r are its values at the ends, then those of r'' in polynomials in xi that are orthonormal in s. They are
-    integrated in s by Legendre series in xi: of degree n where s is linear in xi, which is exact, of many more where it is not.
+    The coefficients of r are its values at the ends, then the coefficients of r'' in polynomials in xi that are orthonormal in s.
+    These polynomials are integrated in s by Legendre series in xi: of degree n if s is linear in xi, which is exact, otherwise of a
+    much higher degree.
     """
     length, modes = density.length, 3 * n + 300 if density.centres else n
     points, weights = legendre.leggauss(modes + 1)
@@ -76,9 +77,8 @@ def polynomials(n: int, density: Density) -> Functions:
     second = np.linalg.inv(r) * np.sign(np.diag(r))  # columns are functions, by their Legendre coefficients
     first = legendre.legint(series @ (values @ second * stretch), lbnd=-1)
     zeroth = legendre.legint(series @ (legendre.legval(points, first).T * stretch), lbnd=-1)
-    tilt = (
-        legendre.legval(1.0, zeroth) - legendre.legval(-1.0, zeroth)
-    ) / length  # of the straight line that leaves no value at the ends
+    # slope of the straight line that makes the functions vanish at both ends
+    tilt = (legendre.legval(1.0, zeroth) - legendre.legval(-1.0, zeroth)) / length
     to_legendre = np.linalg.inv(legendre.legvander(lobatto(n - 1)[0], n - 1))
     derivatives = [legendre.legder(to_legendre, m) for m in range(3)]
 
@@ -126,7 +126,7 @@ def polynomials(n: int, density: Density) -> Functions:
 
 @lru_cache(maxsize=16)
 def waves(n: int, density: Density) -> Functions:
-    """The first n (odd) of 1, cos, sin, ... on a closed rod; coefficients of r are those of the series."""
+    """The first n (odd) of 1, cos, sin, ... on a closed rod. The coefficients of r are those of the series."""
     length = density.length
     q = 2 * np.pi / length * np.repeat(np.arange(1.0, n // 2 + 1), 2)
     phase = np.tile([0.0, -np.pi / 2], n // 2)

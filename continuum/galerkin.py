@@ -1,30 +1,32 @@
-r"""The rod whose sections roll along the centre line, by Galerkin's method with polynomials, or Fourier series on a closed rod.
+"""The rod with slaved headings by Galerkin's method, with polynomials, or Fourier series on a closed rod.
 
 Admissible velocities and variations are (e psi, psi). With r = x + i y, z = r' and e = i R h(z), h a law of `discs.chains.rolling`,
 d'Alembert's principle reads, for every psi,
 
     int (alpha + rho |e|^2) omega. psi + rho omega Re(conj(e) e.) psi = - int K Re(conj(r'') (e psi)'') + beta theta' psi'.
 
-The ends need care. A free end asks that r'' do no work on (e psi)', which is kappa psi' = 0: the tangential part of r'' is
-*not* zero there. If e psi is replaced by the polynomial through its values at nodes (collocation), their slopes differ at the
-end, the tangential part of r'' works on the difference, and all fields are wrong by the first order of the end spacing. Here
-instead r moves by the projection P(e omega) that keeps int Re(conj(r'') f'') for every r'' it is made of: (P f)'' is the L2
-projection of f'', and the two numbers that r'' does not know are the values of f at the ends (on a closed rod one, the mean). So
+**Ends.** At a free end r'' does no work on (e psi)', which is kappa psi' = 0. The tangential part of r'' is *not* zero there.
+Collocation would replace e psi by the polynomial through its values at the nodes. The slope of this polynomial at the end differs
+from that of e psi, the tangential part of r'' does work on the difference, and all fields get an error of first order in the
+spacing at the end. Instead, r moves by the projection P(e omega), defined so that int Re(conj(r'') f'') is the same for f and P f
+with every r'' of the basis: (P f)'' is the L2 projection of f''. The two numbers that r'' does not determine are the values of f at
+the ends (on a closed rod the one number is the mean). So
 
     r. = P (e omega),   theta. = omega,   pi = sqrt(w (alpha + rho |e|^2)) omega at nodes of weight w
 
-is a skew-gradient system q. = C pi, pi. = - C^T grad V with V = int K |r''|^2/2 + beta theta'^2/2 quadratic, and Gauss methods
-keep its energy. Unknown are the coefficients of r'' and the ends, so nothing but omega is differentiated and no digits are
-lost. Integrals with e take 1.5 points a node, which is exact under the field law.
+is a skew-gradient system q. = C pi, pi. = - C^T grad V with the quadratic V = int K |r''|^2/2 + beta theta'^2/2, and Gauss methods
+conserve its energy. The unknowns are the coefficients of r'' and the ends, so only omega is differentiated, and no digits are lost.
+Integrals with e take 1.5 points per node, which is exact for the field law.
 
-Initial fields are projected, not read at the nodes, so that nothing between them is missed. With theta = theta_0(s) + vartheta the
-initial twist is only in V = int beta vartheta'^2/2 + K |r''|^2/2 + f . vartheta + const, by its moment about every function,
+**Initial fields** are projected, not sampled at the nodes, so features between the nodes are not missed. With theta =
+theta_0(s) + vartheta, the initial twist enters only V = int beta vartheta'^2/2 + K |r''|^2/2 + f . vartheta + const, by its moment
+with each function,
 
     f_k = int beta theta_0' psi_k' = beta ([theta_0 psi_k'] - int theta_0 psi_k''),
 
-by a quadrature that resolves theta_0 (`continuum.initial`); no derivative of it is needed. vartheta is smoother than theta_0: a
-twist much narrower than the functions costs little accuracy where the rod rolls. r is fitted by least squares in s, omega at a node
-is the mean of the initial one with the node's function.
+computed by a quadrature that resolves theta_0 (`continuum.initial`); no derivative of theta_0 is needed. vartheta is smoother than
+theta_0, so a twist much narrower than the functions costs little accuracy where the rod rolls. r is fitted by least squares in s.
+omega at a node is the mean of the initial omega weighted by the function of the node.
 """
 
 from collections.abc import Callable
@@ -42,11 +44,11 @@ from discs.arrays import Complex, Float
 from discs.chains.rolling import ROLLING
 from discs.skew import Phase, SkewGradient
 
-DATA = 24  # points of a piece of the initial fields, besides those for the functions
+DATA = 24  # quadrature points per piece of the initial fields, in addition to those for the functions
 
 
 class Modes(NamedTuple):
-    """The eigenvectors of C^T (grad^2 V) C at a configuration: values (n,), vectors (n, n) in columns, back their transpose."""
+    """The eigenvectors of C^T (grad^2 V) C at a configuration: values (n,), vectors (n, n) as columns, back their transpose."""
 
     values: Float
     vectors: Float
@@ -54,8 +56,10 @@ class Modes(NamedTuple):
 
 
 class Basis(NamedTuple):
-    """C at a configuration (or several, with one more axis before): e (n,) and t = 1/sqrt(w (alpha + rho |e|^2)) at the nodes; e'',
-    2 e', e (3, F) at the finer points."""
+    """C at one configuration, or at several with one more leading axis.
+
+    e (n,) and t = 1/sqrt(w (alpha + rho |e|^2)) (n,) at the nodes; finer : e'', 2 e', e (3, F) at the finer points.
+    """
 
     e: Complex
     t: Float
@@ -65,14 +69,15 @@ class Basis(NamedTuple):
 class SpectralRod(SkewGradient):
     """The equations of motion of a scene on n functions.
 
-    Rows x, y of a configuration are coefficients of the `functions`, row theta is what is added to the initial theta, at the nodes.
+    Rows x, y of a configuration are coefficients of the `functions`. Row theta is the change of theta since the start, at the
+    nodes.
 
     Attributes
     ----------
-    law : of rolling.
-    closed : whether the rod is.
+    law : the law of rolling.
+    closed : whether the rod is closed.
     twist : (n,), the moment f of the initial twist.
-    crossing : the time that a wave of the rod's length takes along it, over 2 pi.
+    crossing : the time in which a wave as long as the rod crosses it, over 2 pi.
     start : the initial state.
     """
 
@@ -92,13 +97,13 @@ class SpectralRod(SkewGradient):
         self._mass, self._spin = self.functions.w * rod.density, self.functions.w * rod.spin_inertia
         stiffness = rod.torsion_stiffness * rod.length**2 + rod.bending_stiffness * rod.radius**2
         self.crossing = rod.length**2 * np.sqrt(rod.inertia / stiffness) if stiffness else np.inf
-        self._shift = complex(*scene.shift) / rod.length  # of a closed rod's line; z is the slope of the rest plus this
+        self._shift = complex(*scene.shift) / rod.length  # mean slope of a closed rod; z is the slope of the series plus this
         self.twist, self._offset = np.zeros(n), 0.0
         self.start = self._start(resolve(scene))
 
     @cached_property
     def parameters(self) -> Spectral:
-        """The parameters for the compiled form of steps, which are still to be given modes."""
+        """The parameters of the compiled form; its modes are set before each step."""
         return Spectral(
             bends=self._bends,
             rates=self._rates,
@@ -119,11 +124,11 @@ class SpectralRod(SkewGradient):
 
     @cached_property
     def line(self) -> Float:
-        """Coefficients of r to its values at the nodes, (n, n)."""
+        """The matrix from coefficients of r to its values at the nodes, (n, n)."""
         return self.functions.line(self.functions.s)
 
     def _start(self, initial: Resolved) -> Phase:
-        """The initial state; sets the twist, and the offset of V that makes the energy at the start that of the initial fields."""
+        """The initial state. Also sets the twist, and the constant of V that makes the energy that of the initial fields."""
         scene, functions = self._scene, self.functions
         s, w = initial.quadrature(DATA + self.n // 2)
         fields, ends = scene.fields(s), np.array([0.0, scene.rod.length])
@@ -145,12 +150,12 @@ class SpectralRod(SkewGradient):
         return start
 
     def slopes(self, z: Phase) -> Complex:
-        """r' at the nodes, (..., n), as a complex number."""
+        """r' at the nodes as complex numbers, (..., n)."""
         xy = (z.hi + z.lo)[..., :2, :] @ self.functions.bends[: self.n].T
         return xy[..., 0, :] + 1j * xy[..., 1, :] + self._shift
 
     def _omega(self, z: Phase) -> Float:
-        """omega at the nodes, (..., n); as `basis` has it, without the finer points."""
+        """omega at the nodes, (..., n), as in `basis` but without the finer points."""
         e = self._radius * self.law.size(np.abs(self.slopes(z)))
         return z.pi / np.sqrt(self._spin + self._mass * e**2)
 
@@ -159,7 +164,7 @@ class SpectralRod(SkewGradient):
         return float(self.energies(z))
 
     def energies(self, z: Phase) -> Float:
-        """Those of several states at once, by leading axes."""
+        """The energies of several states, by leading axes."""
         kinetic: Float = 0.5 * (z.pi * z.pi).sum(axis=-1)
         return kinetic + self._potentials(z.hi + z.lo)
 
@@ -168,7 +173,7 @@ class SpectralRod(SkewGradient):
         return 0.5 * twice + self._offset
 
     def reader(self, s: Float) -> Callable[[Phase], dict[str, Float]]:
-        """A function of states, several at once by leading axes, that returns x, y, theta, omega at places s, each (..., S)."""
+        """A function that returns x, y, theta, omega of states at places s, each (..., S). States may have leading axes."""
         line, field, theta = self.functions.line(s), self.functions.field(s), self._scene.fields(s)["theta"]
 
         def at(z: Phase) -> dict[str, Float]:
@@ -179,7 +184,7 @@ class SpectralRod(SkewGradient):
         return at
 
     def slip(self, z: Phase) -> Float:
-        """Largest |r. - e omega| at the nodes: what the projection leaves of the constraint; several at once by leading axes."""
+        """Largest |r. - e omega| at the nodes, the error of the projection in the constraint. States may have leading axes."""
         c = self.basis(z.hi + z.lo)
         rates = self.forward(c, z.pi)
         moved = (rates[..., 0, :] + 1j * rates[..., 1, :]) @ self.line.T
@@ -192,7 +197,7 @@ class SpectralRod(SkewGradient):
     def moved(self, shape: Float, dq: Float) -> Float:
         return shape + dq
 
-    # All of these take several configurations at once, by leading axes
+    # The following take several configurations at once, by leading axes
 
     def basis(self, shape: Float) -> Basis:
         xy = shape[..., :2, :] @ self._bends
@@ -241,7 +246,7 @@ class SpectralRod(SkewGradient):
         return out
 
     def modes(self, c: Basis) -> Modes:
-        """The eigenvectors of C^T (grad^2 V) C: with them (I + g C^T (grad^2 V) C)^-1 takes two products for any g."""
+        """The eigenvectors of C^T (grad^2 V) C. With them (I + g C^T (grad^2 V) C)^-1 takes two matrix products for any g."""
         n, points = self.n, c.finer.shape[1]
         moves = np.zeros((n, points + n), complex)  # e psi of every function
         moves[:, :points] = (c.finer * self.functions.rates.reshape(3, points, n).transpose(2, 0, 1)).sum(axis=1)

@@ -1,25 +1,27 @@
-r"""Initial fields, resolved before anything is computed from them: `resolve(scene)`.
+"""Resolution of the initial fields, before anything is computed from them: `resolve(scene)`.
 
-A solver that reads the initial fields at n places of its own takes a bump between two of them for a rod at rest. So the length is
-first cut into pieces on which every field is smooth, by bisection (Chebfun's splitting; Pachon, Platte and Trefethen, 2010). On a
-piece of width h a field f is read at 16 Gauss nodes and expanded in Legendre polynomials,
+A solver that samples the initial fields at its own n places can miss a bump between two of them. So the length is first cut into
+pieces on which every field is smooth, by bisection (Chebfun's splitting; Pachon, Platte and Trefethen, 2010). On a piece of width h
+a field f is sampled at 16 Gauss nodes and expanded in Legendre polynomials,
 
-    f(s) = sum_{k < 16} c_k P_k(x),    x = 2 (s - middle)/h,
+    f(s) = sum_{k < 16} c_k P_k(x),    x = 2 (s - middle)/h.
 
-and the piece is kept if for every field the last three |c_k|, the misfit at eight other places of the piece, and the misfit at
-those of 8192 probes that lie in it are below 1e-12 of the field's size (the largest deviation from its mean, for x and y from the
-chord) or below rounding. The probes stand one in each 8192th of the length, at irregular places, so gaps between them are at
-most 1/4096: whatever is wider than length/4000 is found wherever it is, and a Gaussian of width length/40000.
+The piece is kept if the following are, for every field, below 1e-12 of its size or below rounding: the last three |c_k|, the misfit
+at eight other places of the piece, and the misfit at those of 8192 probes that lie in the piece. (The size is the largest deviation
+from the mean, for x and y from the chord.) Each 8192th of the length has one probe, at an irregular place. So gaps between probes
+are at most 1/4096 of the length. A feature wider than length/4000 is found wherever it is, and so is a Gaussian of width
+length/40000.
 
-Bisection closes in on a corner or a jump. Pieces narrower than 1e-9 of the length are replaced by one edge there, and the rest is
-cut again; on both sides of the edge the fields then are smooth, and the jumps f(s+) - f(s-), f'(s+) - f'(s-) are known. Refused are
+Bisection closes in on a corner or a jump. Pieces narrower than 1e-9 of the length are replaced by one edge, and the rest is cut
+again. The fields are then smooth on both sides of the edge, and the jumps f(s+) - f(s-), f'(s+) - f'(s-) are known. Refused are
 
-* a jump of any field: the energy of a jump of theta is infinite, and no smooth functions approach a jump of omega evenly;
-* a corner of the line where it has bending stiffness: int K |r''|^2/2 is infinite (own headings bend by phi', and only phi must be
-  continuous);
-* an infinite slope, as of sqrt(s), and noise; a line that stands still, r' = 0, where it needs a heading.
+* a jump of any field: a jump of theta has infinite energy, and smooth functions do not converge uniformly to a jump of omega;
+* a corner of the line if it has bending stiffness, because int K |r''|^2/2 is infinite (steered rods bend by phi', so only phi must
+  be continuous);
+* an infinite slope, as of sqrt(s), and noise;
+* r' = 0 where the line needs a heading.
 
-A corner of theta, omega or phi has finite energy and is kept.
+A corner of theta, omega or phi has finite energy and is accepted.
 """
 
 from dataclasses import dataclass, replace
@@ -33,23 +35,24 @@ from discs.arrays import Float
 from discs.chains.links import CURVATURE
 from discs.chains.rolling import ROLLING
 
-SHARP = 1e-6  # pieces shorter than this, of the length, may not hold more than a thousandth of the energy
-STILL = 1e-6  # slopes below this, of the largest, are none
-NARROW = 20.0  # features are what varies over less than this part of the length
+SHARP = 1e-6  # of the length: shorter pieces may have at most a thousandth of the energy
+STILL = 1e-6  # of the largest slope: smaller slopes count as zero
+NARROW = 20.0  # features are narrower than the length over this
 
 
 @dataclass(frozen=True, eq=False)
 class Resolved:
-    """A scene's initial fields on pieces where they are smooth.
+    """The initial fields of a scene on pieces where they are smooth.
 
     Attributes
     ----------
     scene : the scene.
-    pieces : (P + 1,), edges of the pieces, from 0 to the length; corners are among them.
+    pieces : (P + 1,), edges of the pieces, from 0 to the length. Corners are among them.
     energy : kinetic and potential energy by Gauss quadrature, relative error about 1e-12.
-    potential : the potential energy alone.
-    features : (place, width) of all that is narrower than length/20: the middle of a stretch where some field f of size F has
-        g = max(|f'|, sqrt(F |f''|/2))/F above 20/length, and 1/max g there, about w for exp(-(s/w)^2) and tanh(s/w).
+    potential : the potential energy.
+    features : (place, width) of each feature narrower than length/20. With g = max(|f'|, sqrt(F |f''|/2))/F for a field f of size
+        F, a feature is a stretch where g is above 20/length for some field. place : its middle. width : 1/max g on it, which is
+        about w for exp(-(s/w)^2) and tanh(s/w).
     kinks : places where the slope of a field jumps, to 1e-10 of the length.
     """
 
@@ -65,18 +68,19 @@ class Resolved:
         return self.scene.fields(s)
 
     def quadrature(self, order: int) -> tuple[Float, Float]:
-        """Places and weights of Gauss's rule with `order` points on every piece, each (P order,)."""
+        """Places and weights of Gauss quadrature with `order` points on every piece, each (P order,)."""
         x, w = legendre.leggauss(order)
         half = np.diff(self.pieces)[:, None] / 2
         return (self.pieces[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
 
 def resolve(scene: Scene) -> Resolved:
-    """Cut the length of a scene into pieces on which its initial fields are smooth; kept with the scene.
+    """Cut the length of a scene into pieces on which its initial fields are smooth. The result is stored with the scene.
 
     Raises
     ------
-    ValueError : for fields that no pieces resolve, and for a closed scene whose ends do not meet; says where and what would do.
+    ValueError : for fields that no pieces resolve, and for a closed scene whose ends do not meet. The message names the place and
+        the cure.
     """
     if "_resolved" not in scene.__dict__:
         object.__setattr__(scene, "_resolved", _resolve(scene))
@@ -108,13 +112,13 @@ def _resolve(scene: Scene) -> Resolved:
 
 
 def _seam(data: Data) -> Float:
-    """What the fields of a closed scene gain around it, (F,)."""
+    """The advance of each field of a closed scene over its length, (F,)."""
     gains = {"x": data.scene.shift[0], "y": data.scene.shift[1], "phi": 2 * np.pi * data.scene.turns}
     return np.array([gains.get(name, 0.0) for name in data.names])
 
 
 def _check_jumps(data: Data, cut: Cut) -> None:
-    """Refuse jumps of fields and corners of the line, between pieces, at the seam of a closed scene and at a free end."""
+    """Refuse jumps of fields and corners of the line: between pieces, at the seam of a closed scene and at free ends."""
     scene, ends = data.scene, cut.at(ENDS)
     limit = 1e3 * np.maximum(data.allowed, cut.misfit)
     first, last = ends[:, 0, 0], ends[:, -1, 1]
@@ -134,8 +138,8 @@ def _check_jumps(data: Data, cut: Cut) -> None:
                 f"take data that meet at the seam{by}",
             )
     else:
-        own = data.read(np.array([0.0, data.length]))
-        jumps = np.stack([first - own[:, 0], own[:, 1] - last], axis=1)
+        given = data.read(np.array([0.0, data.length]))
+        jumps = np.stack([first - given[:, 0], given[:, 1] - last], axis=1)
         _check_jump(data, jumps, limit[:, None], np.array([0.0, data.length]))
     if not scene.steered:
         if scene.rod.bending_stiffness:
@@ -154,12 +158,12 @@ def _check_jump(data: Data, jumps: Float, limit: Float, places: Float) -> None:
     data.refuse(
         int(row),
         f"jumps by {jumps[row, p]:.4g} at s = {s:.10g}: a field of a rod is continuous, and no functions resolve a jump",
-        f"spread it over a width of {width:g} or more, as by tanh((s - {s:.6g})/{width:g})",
+        f"spread it over a width of {width:g} or more, for example by tanh((s - {s:.6g})/{width:g})",
     )
 
 
 def _turns(data: Data, cut: Cut) -> tuple[Float, Float, Float]:
-    """Jumps of slopes (F, places) that are more than errors (0 where not), at the places, and the largest slopes (F,)."""
+    """Jumps of slopes (F, places), 0 if within the errors; the places; and the largest slopes (F,)."""
     slope, width = cut.at(ENDS, 1) + data.chord[:, None, None], cut.width
     jumps, near, places = slope[:, 1:, 0] - slope[:, :-1, 1], np.minimum(width[1:], width[:-1]), cut.edges[1:-1]
     if data.scene.closed:
@@ -185,7 +189,7 @@ def _check_corners(data: Data, cut: Cut) -> None:
 
 
 def _check_heading(data: Data, cut: Cut) -> None:
-    """Refuse a line that stands still somewhere, r' = 0; between two nodes r' is taken for straight."""
+    """Refuse a line with r' = 0 somewhere; r' is interpolated linearly between nodes."""
     slope = cut.at(np.concatenate([ENDS[:1], NODES, ENDS[1:]]), 1)[:2] + data.chord[:2, None, None]
     z = slope[0] + 1j * slope[1]
     now, move = z[:, :-1], np.diff(z)
@@ -196,7 +200,7 @@ def _check_heading(data: Data, cut: Cut) -> None:
         rolls = ROLLING[data.scene.rolling].vanishing
         law = f"rolling={data.scene.rolling!r}" if rolls else f"curvature={data.scene.rod.curvature!r}"
         raise ValueError(
-            f"{law} needs a heading: r' = 0 between s = {cut.edges[p]:g} and {cut.edges[p + 1]:g}; take a line that moves on with s"
+            f"{law} needs a heading: r' = 0 between s = {cut.edges[p]:g} and {cut.edges[p + 1]:g}; take a line with r' != 0"
         )
 
 
@@ -206,7 +210,7 @@ def _kinks(data: Data, cut: Cut) -> tuple[float, ...]:
 
 
 def _energies(data: Data, cut: Cut) -> Float:
-    """Kinetic and potential energy of every piece, (2, P); `Rod` has the densities."""
+    """Kinetic and potential energy of every piece, (2, P); see `Rod` for the densities."""
     scene, rod = data.scene, data.scene.rod
     value, slope, bend = (dict(zip(data.names, cut.at(NODES, d), strict=True)) for d in range(3))
     z = slope["x"] + data.chord[0] + 1j * (slope["y"] + data.chord[1])

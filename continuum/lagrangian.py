@@ -1,31 +1,32 @@
-r"""Field equations and momentum maps from a Lagrangian with nonholonomic constraints: the paper's section 2, with SymPy.
+"""Field equations and momentum maps from a Lagrangian with nonholonomic constraints (section 2 of the paper), with SymPy.
 
-Fields y^a are functions of coordinates x^mu, time first: (t, s) for a rod. L depends on their derivatives up to the second,
-constraints phi^alpha on the first. Sums over second derivatives run over ordered pairs (nu, mu), so what the paper writes
-dL/dy_{nu mu} is half of SymPy's derivative where nu and mu differ. With the momenta
+Fields y^a are functions of the coordinates x^mu, time first: (t, s) for a rod. L depends on their derivatives up to the second
+order, constraints phi^alpha up to the first. Sums over second derivatives run over ordered pairs (nu, mu), so the paper's
+dL/dy_{nu mu} is half of SymPy's derivative if nu and mu differ. With the momenta
 
     p_a^nu = dL/dy^a_nu - D_mu (dL/dy^a_{nu mu}),   D_mu = d/dx^mu along a section,
 
 the Euler-Lagrange expression (2ndEL) is E_a = dL/dy^a - D_nu p_a^nu.
 
 Constraint forces are Chetaev's, (constrforms): Phi^alpha = A^alpha_a dy^a, A^alpha_a = dphi^alpha/dy^a_0. The nonholonomic field
-equations are E_a = lambda_alpha A^alpha_a and phi^alpha = 0 (eq:nh). The vakonomic ones, for comparison, are those of the
-Lagrangian L + lambda_alpha phi^alpha, in which the multipliers are fields like the others and get differentiated.
+equations are E_a = lambda_alpha A^alpha_a and phi^alpha = 0 (eq:nh). The vakonomic equations, for comparison, are those of the
+Lagrangian L + lambda_alpha phi^alpha. There the multipliers are fields, and their derivatives occur.
 
-Momentum map. A generator xi = xi^mu d/dx^mu + xi^a d/dy^a moves a section by Q^a = xi^a - y^a_mu xi^mu. Sorted by contact forms,
-the Cartan form (2ndcartan) reads
+**Momentum map.** A generator xi = xi^mu d/dx^mu + xi^a d/dy^a moves a section by Q^a = xi^a - y^a_mu xi^mu. Sorted by contact
+forms, the Cartan form (2ndcartan) reads
 
     Theta = L d^{n+1}x + p_a^nu (dy^a - y^a_sigma dx^sigma) ^ d^n x_nu
             + dL/dy^a_{nu mu} (dy^a_nu - y^a_{nu sigma} dx^sigma) ^ d^n x_mu.
 
-Contact forms vanish along a section, and the prolonged xi contracts them to Q^a and D_nu Q^a. The momentum map along a section is
+Contact forms vanish along a section, and their contractions with the prolonged xi are Q^a and D_nu Q^a. The momentum map along a
+section is
 
     J_xi = j^mu d^n x_mu,   j^mu = L xi^mu + p_a^mu Q^a + dL/dy^a_{nu mu} D_nu Q^a,
 
-for a rod j^0 ds - j^1 dt. Integrating by parts, D_mu j^mu = pr xi(L) + L D_mu xi^mu - Q^a E_a. The first two terms vanish for a
-symmetry of L. By the field equations the last is -lambda_alpha A^alpha_a Q^a, and A^alpha_a Q^a is what xi contracted with the form
-A^alpha_a (dy^a - y^a_mu dx^mu) ^ d^n x_0 of (bundleF) is along a section, times d^n x_0. Where it is 0 too, J_xi is conserved
-(NHnoether); elsewhere this is the nonholonomic momentum equation.
+for a rod j^0 ds - j^1 dt. Integration by parts gives D_mu j^mu = pr xi(L) + L D_mu xi^mu - Q^a E_a. The first two terms vanish for
+a symmetry of L. By the field equations the last one is -lambda_alpha A^alpha_a Q^a. Along a section, A^alpha_a Q^a d^n x_0 is the
+contraction of xi with the form A^alpha_a (dy^a - y^a_mu dx^mu) ^ d^n x_0 of (bundleF). If it vanishes too, J_xi is conserved
+(NHnoether). Otherwise this is the nonholonomic momentum equation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,7 +42,7 @@ Generator = Mapping[sy.Expr, sy.Expr]  # by coordinate and field
 
 
 def _simple(expression: sy.Expr) -> sy.Expr:
-    """Simplified; most zeros only need expanding, which is much faster."""
+    """A simplified expression. Most zeros only need expanding, which is much faster."""
     expanded = sy.expand(expression)
     return expanded if expanded == 0 else sy.simplify(expanded)
 
@@ -51,7 +52,7 @@ class Noether(NamedTuple):
 
     Attributes
     ----------
-    invariance : pr xi(L) + L D_mu xi^mu, 0 for a symmetry of the Lagrangian.
+    invariance : pr xi(L) + L D_mu xi^mu; 0 for a symmetry of the Lagrangian.
     work : for each constraint, xi contracted with its reaction force, A^alpha_a Q^a on the constraint manifold.
     """
 
@@ -60,7 +61,7 @@ class Noether(NamedTuple):
 
     @property
     def conserved(self) -> bool:
-        """Whether the momentum is conserved whatever the multipliers are: no source from L, none from the constraint forces."""
+        """Whether the momentum is conserved for all multipliers: neither L nor the constraint forces give a source."""
         return self.invariance == 0 and not any(self.work)
 
 
@@ -72,9 +73,9 @@ class FieldTheory:
     ----------
     lagrangian : L, an expression in the fields and their first and second derivatives.
     fields : y^a, applied functions of the same coordinates, time first, such as Function("x")(t, s).
-    constraints : phi^alpha, expressions in the fields and their first derivatives that vanish. Their derivatives by the
-        fields' rates must be independent. A constraint without rates, such as inextensibility, has no Chetaev force: it
-        belongs in L, with its multiplier among the fields.
+    constraints : phi^alpha, expressions in the fields and their first derivatives that are zero. Their derivatives with respect to
+        the time derivatives of the fields must be independent. A constraint without time derivatives, such as inextensibility, has
+        no Chetaev force. It belongs in L, with its multiplier among the fields.
 
     Raises
     ------
@@ -137,7 +138,7 @@ class FieldTheory:
         """A^alpha_a = dphi^alpha/dy^a_0, the Chetaev forces (constrforms): a row for each constraint, an entry for each field."""
         return tuple(tuple(phi.diff(rate) for rate in self.rates) for phi in self.constraints)
 
-    # The Cartan form's coefficients, zeros left out
+    # Coefficients of the Cartan form, without zeros
 
     @cached_property
     def _first(self) -> dict[tuple[sy.Expr, sy.Symbol], sy.Expr]:
@@ -168,11 +169,12 @@ class FieldTheory:
         return tuple(sy.expand(self.lagrangian.diff(y) - divergence[y]) for y in self.fields)
 
     def equations(self, *, vakonomic: bool = False) -> tuple[sy.Expr, ...]:
-        """What vanishes along a solution, one expression for each field; with `constraints`, a closed system.
+        """The expressions that vanish along a solution, one for each field. With `constraints` they form a closed system.
 
         Parameters
         ----------
-        vakonomic : False, E_a - lambda_alpha A^alpha_a (eq:nh); True, the Euler-Lagrange expressions of L + lambda_alpha phi^alpha.
+        vakonomic : False for E_a - lambda_alpha A^alpha_a (eq:nh), True for the Euler-Lagrange expressions of L + lambda_alpha
+            phi^alpha.
         """
         if vakonomic:
             extended = sum((m * phi for m, phi in zip(self.multipliers, self.constraints, strict=True)), self.lagrangian)
@@ -195,18 +197,18 @@ class FieldTheory:
         return base, {y: given.get(y, sy.S.Zero) - sum(y.diff(mu) * base[mu] for mu in base) for y in self.fields}
 
     def momentum(self, xi: Generator) -> tuple[sy.Expr, ...]:
-        """The momentum map along a section: density and flux (j^0, j^1), with D_t j^0 + D_s j^1 = 0 where it is conserved.
+        """The momentum map along a section: density and flux (j^0, j^1), with D_t j^0 + D_s j^1 = 0 if it is conserved.
 
-        As a form it is j^0 ds - j^1 dt, with d^2 x = dt ^ ds (module docstring). The density of {t: 1} is minus the energy's.
+        As a form it is j^0 ds - j^1 dt, with d^2 x = dt ^ ds (see the module). The density for {t: 1} is minus the energy density.
 
         Parameters
         ----------
-        xi : the generator's components by coordinate and field, the others 0: {t: 1} is d/dt, {x: y, y: -x} is
-            y d/dx - x d/dy. Functions of coordinates and fields.
+        xi : the components of the generator by coordinate and field; components left out are 0. {t: 1} is d/dt, {x: y, y: -x} is
+            y d/dx - x d/dy. Components are functions of coordinates and fields.
 
         Raises
         ------
-        ValueError : for a key that is neither coordinate nor field, or a component with derivatives.
+        ValueError : for a key that is neither a coordinate nor a field, or a component with derivatives.
         """
         base, moves = self._moves(xi)
         current = {mu: self.lagrangian * base[mu] for mu in base}
@@ -217,14 +219,14 @@ class FieldTheory:
         return tuple(sy.expand(j) for j in current.values())
 
     def noether(self, xi: Generator) -> Noether:
-        """Whether a generator, given as for `momentum`, keeps the Lagrangian and is annihilated by the constraint forces.
+        """Whether a generator, as for `momentum`, is a symmetry of the Lagrangian and is annihilated by the constraint forces.
 
-        Along solutions D_mu j^mu = invariance - lambda_alpha work^alpha, conserved or not. L must be invariant itself, as in the
-        paper; a symmetry up to a divergence shows that divergence as its invariance.
+        Along solutions D_mu j^mu = invariance - lambda_alpha work^alpha. L itself must be invariant, as in the paper. For a
+        symmetry up to a divergence the invariance is that divergence.
 
         Raises
         ------
-        ValueError : as `momentum`, and for constraints that SymPy cannot solve for the fields' rates.
+        ValueError : as for `momentum`, and for constraints that SymPy cannot solve for the time derivatives of the fields.
         """
         base, moves = self._moves(xi)
         # pr xi(L) = xi^mu D_mu L + Q^a dL/dy^a + D_mu Q^a dL/dy^a_mu + D_mu D_nu Q^a dL/dy^a_{mu nu}
@@ -236,7 +238,7 @@ class FieldTheory:
         return Noether(_simple(change), tuple(self._on_constraints(w) for w in work))
 
     def _on_constraints(self, expression: sy.Expr) -> sy.Expr:
-        """An expression in first derivatives on the constraint manifold: what it is on a branch where it is not 0, if any."""
+        """An expression in first derivatives, evaluated on the constraint manifold: on a branch where it is not 0, if any."""
         for branch in self._branches:
             value = _simple(expression.xreplace(branch))
             if value != 0:
@@ -245,7 +247,7 @@ class FieldTheory:
 
     @cached_property
     def _branches(self) -> list[dict[sy.Expr, sy.Expr]]:
-        """The constraints solved for as many rates, every solution."""
+        """All solutions of the constraints for as many time derivatives."""
         for chosen in combinations(range(len(self.fields)), len(self.constraints)):
             block = sy.Matrix(len(chosen), len(chosen), [row[a] for row in self.forces for a in chosen])
             if sy.simplify(block.det()) == 0:

@@ -1,9 +1,9 @@
 """A `CellTheory` on a lattice of nodes: residuals, their derivatives, and steps in time.
 
-Each part of the discrete Lagrangian is evaluated in all its cells at once, and its derivative by each of their points is added to
-the node that the point is: the sum D_1 + ... + D_6 of (discEL), which also gives the natural conditions at free ends, where cells
-are missing. A step takes two levels q_{n-1}, q_n to the next: it solves (discNH) and phi_d = 0 for q_{n+1} and the multipliers, by
-Newton's method with exact derivatives in sparse matrices, or by one linear solve where both are linear in these.
+Each part of the discrete Lagrangian is evaluated in all its cells at once. Its derivative with respect to each point of a cell is
+added to the node of that point. This is the sum D_1 + ... + D_6 of (discEL). At free ends, where cells are missing, it gives the
+natural conditions. A step from two levels q_{n-1}, q_n solves (discNH) and phi_d = 0 for q_{n+1} and the multipliers, by Newton's
+method with exact derivatives in sparse matrices; if both are linear in the unknowns, one linear solve is enough.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +25,7 @@ _Compiled: TypeAlias = Callable[..., list[Float | float]]  # of the arguments (c
 
 
 class Path(NamedTuple):
-    """What a run returns.
+    """The result of a run.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Path(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """Where an argument stands in u = (q_{n-1}, q_n, q_{n+1}, lambda), flat, for each cell; and what to add on further turns."""
+    """Where an argument is in u = (q_{n-1}, q_n, q_{n+1}, lambda), flat, for each cell; and its advance on further turns."""
 
     at: Int
     jump: Float | float = 0.0
@@ -50,9 +50,9 @@ class _Term:
     Parameters
     ----------
     cells : the nodes i, (cells,).
-    expressions : each with the rows (cells,) that it is added to.
-    arguments : places of the symbols.
-    known : entries of u from here on are unknowns.
+    expressions : pairs of an expression and the rows (cells,) that it is added to.
+    arguments : places of the symbols in u.
+    known : index in u of the first unknown.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class _Term:
         return self._evaluate(self._values, u, len(self.rows))
 
     def slopes(self, u: Float) -> Float:
-        """Their derivatives by unknowns, those that are not 0 everywhere, (slopes, cells)."""
+        """The derivatives with respect to unknowns that are not identically 0, (slopes, cells)."""
         return self._evaluate(self._slopes, u, len(self.pattern))
 
 
@@ -97,20 +97,20 @@ class Lattice:
     Parameters
     ----------
     theory : the discrete Lagrangian and constraints.
-    nodes : how many.
+    nodes : number of nodes.
     values : a number for every symbol of the theory, h and k included.
-    closed : node `nodes` is node 0 again, up to `shift`; otherwise the ends are free.
-    shift : what each field grows by on one turn of a closed lattice, (fields,).
+    closed : whether node `nodes` is node 0 again, up to `shift`; otherwise the ends are free.
+    shift : advance of each field over one turn of a closed lattice, (fields,).
 
     Attributes
     ----------
-    n_multipliers : C, how many multipliers there are.
+    n_multipliers : C, the number of multipliers.
     linear : whether a step is one linear solve.
 
     Raises
     ------
-    ValueError : for a symbol without a number, cells that leave the lattice, fewer nodes than a cell takes, or a shift of a
-        lattice with free ends.
+    ValueError : for a symbol without a number, cells that leave the lattice, too few nodes for a cell, or a shift of a lattice with
+        free ends.
     """
 
     def __init__(
@@ -134,7 +134,7 @@ class Lattice:
     # Assembly
 
     def _numeric(self, expression: sy.Expr) -> sy.Expr:
-        """An expression with numbers for its symbols."""
+        """An expression with its symbols replaced by numbers."""
         plain = sy.sympify(expression).xreplace(self._numbers)
         names = {value: sy.Dummy() for value in plain.atoms(sy.Indexed)}
         missing = plain.xreplace(names).free_symbols - {i, *names.values()}
@@ -143,7 +143,7 @@ class Lattice:
         return plain
 
     def _cells(self, part: Part, reached: Sequence[Point]) -> Int:
-        """The nodes i of a part's cells, given the points it reaches."""
+        """The nodes i of the cells of a part, given the points it contains."""
         every = np.arange(self.nodes)
         offsets = [0] if self.closed else [0, *(p.offset for p in reached)]
         if part.cells is None:
@@ -159,13 +159,13 @@ class Lattice:
         return chosen
 
     def _place(self, point: Point, cells: Int) -> _Place:
-        """Where a point of cells stands in u."""
+        """Where a point of the cells is in u."""
         field = self.theory.fields.index(point.field)
         turns, nodes = np.divmod(cells + point.offset, self.nodes)
         return _Place((point.level + 1) * self._size + field * self.nodes + nodes, self._shift[field] * turns)
 
     def _stationary(self, part: Part) -> list[_Term]:
-        """Derivatives of a part of L_d by points of level n, in cells (n, i), and by points of level n+1, in cells (n-1, i)."""
+        """Derivatives of a part of L_d with respect to points of level n in cells (n, i), and of level n+1 in cells (n-1, i)."""
         expression, values = self._numeric(part.expression), points(part.expression)
         cells = self._cells(part, list(values.values()))
         terms = []
@@ -180,15 +180,15 @@ class Lattice:
         phi, *forces = (self._numeric(e) for e in (phi, *row))
         values = points(sy.Tuple(phi, *forces))
         cells = self._cells(constraint, list(values.values()))
-        own = self._size + self.n_multipliers + np.arange(cells.size)
+        rows_phi = self._size + self.n_multipliers + np.arange(cells.size)
         self.n_multipliers += cells.size
-        arguments = {value: self._place(p, cells) for value, p in values.items()} | {multiplier: _Place(2 * self._size + own)}
+        arguments = {value: self._place(p, cells) for value, p in values.items()} | {multiplier: _Place(2 * self._size + rows_phi)}
         rows = [(-multiplier * force, a * self.nodes + cells) for a, force in enumerate(forces) if force != 0]
-        return _Term(cells, [*rows, (phi, own)], arguments, 2 * self._size)
+        return _Term(cells, [*rows, (phi, rows_phi)], arguments, 2 * self._size)
 
     @cached_property
     def _densities(self) -> list[_Term]:
-        """The parts of L_d themselves."""
+        """The parts of L_d."""
         terms = []
         for part in self.theory.lagrangian:
             values = points(part.expression)
@@ -210,12 +210,12 @@ class Lattice:
         return np.bincount(self._rows, weights, self._size + self.n_multipliers).astype(np.float64, copy=False)
 
     def _jacobian(self, u: Float) -> sp.csc_array:
-        """Derivatives of the residual by q_{n+1} and the multipliers."""
+        """Derivatives of the residual with respect to q_{n+1} and the multipliers."""
         entries = np.concatenate([term.slopes(u).ravel() for term in self._terms])
         return sp.csc_array((entries, tuple(self._pattern)), shape=(self._size + self.n_multipliers,) * 2)
 
     def residual(self, before: ArrayLike, now: ArrayLike, after: ArrayLike, multipliers: ArrayLike = 0.0) -> tuple[Float, Float]:
-        """What a solution makes vanish: E_a - lambda_alpha Phi^alpha_a (fields, nodes) and phi_d (C,); (discNH).
+        """The residual, zero for a solution of (discNH): E_a - lambda_alpha Phi^alpha_a (fields, nodes) and phi_d (C,).
 
         Parameters
         ----------
@@ -239,19 +239,19 @@ class Lattice:
     def step(
         self, before: ArrayLike, now: ArrayLike, multipliers: ArrayLike = 0.0, *, tolerance: float = 1e-12, sweeps: int = 20
     ) -> tuple[Float, Float]:
-        """One level further: q_{n+1} (fields, nodes) and the multipliers (C,) at level n.
+        """The next level: q_{n+1} (fields, nodes), and the multipliers (C,) at level n.
 
         Parameters
         ----------
         before, now : levels n-1 and n, (fields, nodes).
-        multipliers : where Newton's method starts.
-        tolerance : it ends when no value changes by more than this part of the largest.
-        sweeps : at most so many Newton steps.
+        multipliers : initial guess for Newton's method.
+        tolerance : Newton's method ends when no value changes by more than this, relative to the largest value.
+        sweeps : largest number of Newton steps.
 
         Raises
         ------
         ValueError : for levels of another shape.
-        RuntimeError : where the equations do not determine the next level, or Newton's method does not converge.
+        RuntimeError : if the equations do not determine the next level, or Newton's method does not converge.
         """
         checks.iteration(sweeps, tolerance)
         u = self._stacked(before, now, 2 * np.asarray(now) - np.asarray(before), multipliers)
@@ -271,7 +271,7 @@ class Lattice:
         raise RuntimeError(f"Newton's method does not converge in {sweeps} sweeps (last change {change:.2g}): take a smaller h")
 
     def run(self, first: ArrayLike, second: ArrayLike, steps: int, *, tolerance: float = 1e-12, sweeps: int = 20) -> Path:
-        """Levels 0 and 1 and `steps` further ones; parameters and errors as for `step`."""
+        """A run of `steps` steps from levels 0 and 1; parameters and errors are as for `step`."""
         steps = checks.whole("steps", steps, 1)
         values = np.empty((steps + 2, len(self.theory.fields), self.nodes))
         multipliers = np.zeros((steps, self.n_multipliers))

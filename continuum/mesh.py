@@ -1,4 +1,4 @@
-"""The rod on a mesh: second-order finite differences in s, which read as rolling discs."""
+"""The rod on a mesh: second-order finite differences in s, which are the equations of rolling discs."""
 
 import numpy as np
 
@@ -8,23 +8,23 @@ from continuum.rod import Scene, SteeredRod
 from discs import Chain, Problem, State, SteeredChain, checks
 from discs.chains import stencils
 
-UNSEEN = 1 / 4  # of an energy: discs that miss more than this of it do not see the initial fields
+UNSEEN = 1 / 4  # of an energy: discs that miss more than this do not resolve the initial fields
 
 
 def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
-    """The field equations of a scene on n nodes, as the problem of n discs that they are.
+    """The field equations of a scene on n nodes, as the problem of n discs.
 
-    A node with its share of length is a disc, a finite difference of the potential is a spring: with the stencils of
-    `discs.chains.stencils` the energy is that of a chain, and the constraint that of rolling discs. A closed scene makes a ring
-    whatever `ends` says. Discs with headings of their own (`SteeredRod`) have one kind of free ends, "springs".
+    A node with its share of length is a disc, a finite difference of the potential is a spring. With the stencils of
+    `discs.chains.stencils` the energy is that of a chain, and the constraint that of rolling discs. A closed scene gives a ring for
+    any `ends`. Steered discs (of a `SteeredRod`) have one kind of free ends, "springs".
 
     Parameters
     ----------
-    n : nodes, both ends counted, or all around a ring.
+    n : number of nodes, both ends counted, or all around a ring.
     ends : "consistent" (second order), "springs" (first order) or "paper" (the paper's, first order).
     """
     if not isinstance(scene, Scene):
-        raise ValueError(f"a Scene is wanted, as untwisting_rod() makes; got {type(scene).__name__}")
+        raise ValueError(f"a Scene is wanted, such as untwisting_rod(); got {type(scene).__name__}")
     checks.choice("ends", ends, stencils.ENDS)
     if ends == "ring" and not scene.closed:
         raise ValueError("ends='ring' needs a closed scene; this one has two free ends: take 'springs' or 'consistent'")
@@ -42,17 +42,18 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
 
 
 def unseen(scene: Scene, problem: Problem) -> str:
-    """What to warn of where the discs of a scene are too few to see its initial fields; empty where they are not.
+    """The warning if the discs are too few to resolve the initial fields of a scene; otherwise empty.
 
-    Straight lines between the discs are taken for the fields. For theta their energy is that of the springs, and as they are the
-    projection in energy,
+    Consider the fields that are linear between the discs. For theta their energy is that of the springs. They are the projection in
+    energy, so that
 
-        beta/2 int theta'^2 - sum beta (theta_{i+1} - theta_i)^2/2k = beta/2 int (theta' - its slope between the discs)^2 >= 0:
+        beta/2 int theta'^2 - sum beta (theta_{i+1} - theta_i)^2/2k = beta/2 int (theta' - its slope between the discs)^2 >= 0.
 
-    what is missing of the energy is the energy of what is missed, wherever the discs stand. Bending and shear are compared alike.
-    Of omega (and the rate of phi) what is missed is M/2 int (omega - the lines)^2, against M/2 int (omega - its mean)^2. A quarter
-    of either, half of a field by its root mean square, is too much; parts below a millionth of the whole energy do not count.
-    The paper's twist lacks 1.3 % at n = 9; a bump exp(-(s/w)^2) a quarter at k = w.
+    So the missing energy measures the missing part of the field, wherever the discs are. Bending and shear are compared in the same
+    way. For omega (and the rate of phi) the missing part is M/2 int (omega - linear interpolation)^2, compared with
+    M/2 int (omega - mean)^2. A quarter of either, which is half of a field by its root mean square, gives a warning. Parts below a
+    millionth of the whole energy are ignored. The paper's twist misses 1.3 % at n = 9; a bump exp(-(s/w)^2) misses a quarter at k =
+    w.
     """
     try:
         found = resolve(scene)

@@ -1,4 +1,4 @@
-"""Fields on pieces of the length where they are smooth: bisection and Legendre polynomials; see `continuum.initial`."""
+"""Piecewise Legendre polynomials of the initial fields, by bisection; see `continuum.initial`."""
 
 from dataclasses import dataclass
 from typing import NoReturn
@@ -11,11 +11,11 @@ from discs.arrays import Bool, Float, Int
 
 POINTS = 16  # Gauss nodes of a piece
 PROBES = 8192
-SMALL = 1e-12  # misfit that is allowed, relative to the field's size
-NOISE = 1e-9  # misfit, relative, that is taken for rounding of the scene's own if both halves of a piece have it too
-TINY = 1e-9  # pieces shorter than this, of the length, hold a corner or a jump
-SHORTEST = 2.0**-43  # of the length: places are rounded
-MOST = 4096  # pieces that are bisected at once
+SMALL = 1e-12  # misfit allowed, relative to the size of the field
+NOISE = 1e-9  # relative misfit that counts as rounding of the given data if both halves of a piece have it too
+TINY = 1e-9  # of the length: shorter pieces contain a corner or a jump
+SHORTEST = 2.0**-43  # of the length: smallest width, as places are rounded
+MOST = 4096  # pieces bisected at once
 EPS = np.finfo(float).eps
 
 NODES, WEIGHTS = legendre.leggauss(POINTS)
@@ -27,7 +27,7 @@ ENDS = np.array([-1.0, 1.0])
 
 
 class Data:
-    """A scene's initial fields as rows (F, ...), x and y less their chord, with the size of each and the misfit that is allowed."""
+    """The initial fields of a scene as rows (F, ...), x and y less their chord; the size of each and the misfit allowed."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.length = scene, scene.rod.length
@@ -46,11 +46,11 @@ class Data:
         self.allowed = SMALL * self.size + self.rounding
 
     def read(self, s: Float) -> Float:
-        """The fields at places (n,), x and y less the chord, (F, n)."""
+        """The fields at places (n,), x and y less their chord, (F, n)."""
         return np.stack(list(self.scene.fields(s).values())) - np.outer(self.chord, s)
 
     def refuse(self, row: int, what: str, cure: str) -> NoReturn:
-        """Raise ValueError about a field, and say so if its values depend on what other places are asked for."""
+        """Raise ValueError about a field. The message says so if its values at a place depend on the other places asked for."""
         apart = np.abs(self.read(self.probes[::2]) - self.known[:, ::2]).max(axis=1)
         if (apart > 1e3 * self.allowed).any():
             name = self.names[int(np.argmax(apart))]
@@ -63,10 +63,10 @@ class Data:
 
 @dataclass(eq=False)
 class Cut:
-    """Pieces: edges (P + 1,) and coefficients (F, P, 16).
+    """Pieces of the length, and Legendre coefficients of the fields on them.
 
-    Further the largest misfit of each field (F,); whether pieces are lost, not resolved at the shortest width, and by which field,
-    each (P,).
+    edges : (P + 1,). c : (F, P, 16), coefficients. misfit : (F,), largest misfit of each field. lost : (P,), whether a piece is not
+    resolved at the smallest width. worst : (P,), the field with the largest misfit.
     """
 
     edges: Float
@@ -80,7 +80,7 @@ class Cut:
         return np.diff(self.edges)
 
     def breaks(self) -> list[float]:
-        """Places of corners and jumps: in each run of tiny pieces the middle of the shortest."""
+        """Places of corners and jumps: in each run of tiny pieces, the middle of the shortest."""
         width = self.width
         tiny = np.flatnonzero(width < TINY * self.edges[-1])
         runs = np.split(tiny, np.flatnonzero(np.diff(tiny) > 1) + 1) if tiny.size else []
@@ -89,17 +89,17 @@ class Cut:
         return [float(s) for s in middles if least < s < self.edges[-1] - least]
 
     def at(self, x: Float, derivative: int = 0) -> Float:
-        """Fields, or derivatives by s, at places x (n,) of every piece, within [-1, 1]: (F, P, n)."""
+        """Fields, or derivatives with respect to s, at places x (n,) in [-1, 1] of every piece, (F, P, n)."""
         polynomials = legendre.legder(np.eye(self.c.shape[-1]), derivative) if derivative else np.eye(self.c.shape[-1])
         values = legendre.legvander(x, len(polynomials) - 1) @ polynomials
         return self.c @ values.T * (2 / self.width[:, None]) ** derivative
 
 
 def split(data: Data, edges: Float) -> Cut:
-    """Bisect pieces until they are resolved, or too short to be cut."""
+    """Bisect pieces until they are resolved or too short to be cut."""
     kept: list[tuple[Float, Float, Float, Float, Bool, Int]] = []
     lo, hi = edges[:-1], edges[1:]
-    before = np.full((len(data.size), lo.size), np.inf)  # misfit of the piece that was cut
+    before = np.full((len(data.size), lo.size), np.inf)  # misfits of the pieces before they were cut
     while lo.size:
         half = (hi - lo) / 2
         values = data.read((lo[:, None] + half[:, None] * (1 + _BOTH)).ravel()).reshape(len(data.size), lo.size, -1)
@@ -107,14 +107,14 @@ def split(data: Data, edges: Float) -> Cut:
         c = nodes @ _EXPAND.T
         misfit = np.maximum(np.abs(c[..., -3:]).max(axis=-1), np.abs(c @ _AT_OTHERS.T - values[..., POINTS:]).max(axis=-1))
         slope = (np.abs(np.diff(nodes)) / np.diff(NODES)).max(axis=-1) / half
-        allowed = data.allowed[:, None] + 8 * EPS * data.length * slope  # the places are rounded
+        allowed = data.allowed[:, None] + 8 * EPS * data.length * slope  # for the rounding of places
         good = (misfit <= allowed).all(axis=0)
         misfit = np.maximum(misfit, _misfit_at_probes(data, lo, hi, c, good))
         noise = (misfit <= NOISE * data.size[:, None]) & _in_both_halves(misfit > before / 4)
         ratio = np.where(noise, 0.0, misfit / allowed)
         lost = (ratio > 1).any(axis=0) & (hi - lo < 2 * SHORTEST * data.length)
         good = (ratio <= 1).all(axis=0) | lost
-        # what is below rounding is no part of the field: derivatives would enlarge it
+        # coefficients below rounding are dropped, as derivatives would amplify them
         c = np.where(np.abs(c) <= data.rounding[:, None, None] / 4, 0.0, c)
         kept.append(
             (lo[good], hi[good], np.moveaxis(c[:, good], 1, 0), misfit[:, good].T, lost[good], np.argmax(ratio, axis=0)[good])
@@ -136,14 +136,14 @@ def split(data: Data, edges: Float) -> Cut:
 
 
 def _in_both_halves(found: Bool) -> Bool:
-    """Where something is found (F, P) in a piece and in its other half, its neighbour in the list; False before any cut."""
+    """Where `found` (F, P) holds for a piece and for its other half, its neighbour in the list; False before any cut."""
     if found.shape[1] % 2:
         return np.zeros_like(found)
     return np.repeat(found[:, ::2] & found[:, 1::2], 2, axis=1)
 
 
 def _misfit_at_probes(data: Data, lo: Float, hi: Float, c: Float, which: Bool) -> Float:
-    """Largest misfit of every field at the probes in those pieces, (F, P); 0 in others and where no probe is."""
+    """Largest misfit of every field at the probes in the pieces `which`, (F, P); 0 in other pieces and in those without probes."""
     worst = np.zeros(c.shape[:2])
     first, last = np.searchsorted(data.probes, lo), np.searchsorted(data.probes, hi)
     for p in np.flatnonzero(which & (last > first)):

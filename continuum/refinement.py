@@ -1,4 +1,4 @@
-"""Fields of sections with headings of their own to a tolerance: more and more elements, the error measured."""
+"""Fields of steered rods (sections with headings of their own) to a tolerance, by elements whose number grows."""
 
 from collections.abc import Mapping, Sequence
 from math import lcm
@@ -15,9 +15,9 @@ from discs import Solution
 from discs.arrays import Float
 
 RATES = ("omega", "phi_rate")
-MOST = 8.0  # times what more elements change: larger errors are not told from it
-COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # of elements
-PLACES = 1024  # of a solution, or a multiple
+MOST = 8.0  # largest ratio of an error to a change
+COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # numbers of elements
+PLACES = 1024  # nodes of a solution, or a multiple
 
 
 class Found(NamedTuple):
@@ -27,32 +27,34 @@ class Found(NamedTuple):
     q: Float
 
     def sample(self, places: int) -> Float:
-        """The unknowns at equally spaced places, a multiple of the elements, (6, F, places)."""
+        """The unknowns at equally spaced places, a multiple of the number of elements, (6, F, places)."""
         return np.stack([self.elements.sample(q, places // self.elements.count) for q in self.q], axis=1)
 
 
 def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
-    """The fields within bounds by name, their error measured on more elements.
+    """The fields within bounds by name; the error is measured with more elements.
 
-    The first elements are as many as hold the initial fields: what is bound within its bound, other fields to a tenth. They are
-    added until the next number of them changes nothing by more than the bounds. If errors fall like count^-p, the error of the
-    coarser of two counts c < C, which is the solution, is
+    1. Start with the fewest elements that resolve the initial fields: bounded fields within their bounds, other fields to a tenth.
+    2. Compute the motion with the next number of elements in COUNTS, and the change from the last motion.
+    3. If errors fall like count^-p, the error of the coarser of two counts c < C, which is the result, is
 
-        (what C elements change)/(1 - (c/C)^p),
+           (change from c to C)/(1 - (c/C)^p).
 
-    p from the changes themselves (`falls`): at least 1.5 times the change, at most `MOST` times. Smooth data have p of 4 and more;
-    a corner sends out corners, and there p is taken as 1 at most. The error is also at least that of the initial fields.
+       p is measured from the changes themselves (`falls`). The factor is at least 1.5 and at most `MOST`. Smooth data have p of 4
+       and more. A corner of the data propagates as a corner; then p is at most 1. The estimate is at least the error of the initial
+       fields.
+    4. If the estimate is within the bounds, stop. Otherwise go to 2.
 
     Returns
     -------
-    Solution on equally spaced nodes, a multiple of 1024 to the length.
+    Solution on equally spaced nodes; the spacing is the length over a multiple of 1024.
     """
     rest = min(1e-7, *(limit / (1e4 if name in RATES else 1e2) for name, limit in bound.items()))  # of the steps, in angles
     first = next((i for i, count in enumerate(COUNTS) if _holds(Elements(scene, count), bound)), len(COUNTS))
     counts = COUNTS[first:]
     if len(counts) < 3:
         raise ValueError(
-            f"tol is not reached on {COUNTS[-1]} elements, as these do not hold the initial fields: {_sharpest(scene)}; "
+            f"tol is not reached on {COUNTS[-1]} elements, as these do not resolve the initial fields: {_sharpest(scene)}; "
             f"take fields varying over length/{COUNTS[-1] // 4} = {4 * scene.rod.length / COUNTS[-1]:.2g} or more, or a larger tol"
         )
     runs: list[Found] = []
@@ -90,9 +92,12 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progr
 
 
 def falls(changes: Float, counts: Sequence[int], most: float) -> Float:
-    """Errors of the last count but one over its change, (6,), from two or three changes (m, 6) between counts (m + 1,).
+    """The ratios of the error on the last count but one to the last change, (6,).
 
-    `most` is the largest order p.
+    Parameters
+    ----------
+    changes : (m, 6), two or three changes between the counts (m + 1,).
+    most : largest order p.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         p = np.log(changes[0] / changes[-1]) / np.log(counts[-2] / counts[-len(changes) - 1])
@@ -101,18 +106,18 @@ def falls(changes: Float, counts: Sequence[int], most: float) -> Float:
 
 
 def _hopeless(scene: Scene, times: float, count: int) -> bool:
-    """Whether errors so many times the bounds will not be mended: with corners they fall like 1/count^2 at best."""
+    """Whether errors, `times` times the bounds, will stay above them: with corners they fall like 1/count^2 at best."""
     return bool(resolve(scene).kinks) and times * (count / COUNTS[-2]) ** 2 > 1
 
 
 def _corners(scene: Scene) -> str:
-    """What to add of initial fields that have corners; empty of others."""
+    """A hint for messages about initial fields that have corners; empty for others."""
     kinks = resolve(scene).kinks
     return f": the initial fields have a corner at s = {kinks[0]:.4g}, which the motion keeps; round it" if kinks else ""
 
 
 def _sharpest(scene: Scene) -> str:
-    """Where initial fields vary most, in words."""
+    """Where the initial fields vary most, for messages."""
     features = resolve(scene).features
     if not features:
         return "they have corners" if resolve(scene).kinks else "they vary too fast"
@@ -121,7 +126,7 @@ def _sharpest(scene: Scene) -> str:
 
 
 def _holds(system: Elements, bound: Mapping[str, float]) -> bool:
-    """Whether the initial fields are there on the elements: what is bound within its bound, other fields to a tenth."""
+    """Whether the elements resolve the initial fields: bounded fields within their bounds, other fields to a tenth."""
     scene = system.scene
     unit = {"x": scene.rod.length, "y": scene.rod.length, "omega": 1 / scene.duration, "phi_rate": 1 / scene.duration}
     for name, misfit in system.misfit.items():

@@ -1,4 +1,4 @@
-"""The rod: its parameters, and a scene that it moves in."""
+"""The rod: its parameters, and a scene, which adds the initial fields."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
@@ -15,19 +15,20 @@ Fields = Callable[[Float], tuple[Float, ...]]
 
 @dataclass(frozen=True, kw_only=True)
 class Rod:
-    """A nonholonomic Cosserat rod, the paper's section 3; any consistent unit system.
+    """A nonholonomic Cosserat rod (section 3 of the paper), in any consistent unit system.
 
     Kinetic energy per length rho |r.|**2/2 + alpha omega**2/2, potential beta theta'**2/2 + K |r''|**2/2.
 
     Parameters
     ----------
-    length : of the rod, > 0.
+    length : length of the rod, > 0.
     density : rho, mass per length, > 0.
-    spin_inertia : alpha, moment of inertia about the discs' axle per length, >= 0; > 0 if R = 0.
+    spin_inertia : alpha, moment of inertia about the axle of the discs per length, >= 0; > 0 if R = 0.
     torsion_stiffness : beta, >= 0.
     bending_stiffness : K, >= 0.
-    radius : R, of the discs, >= 0. With R = 0 nothing rolls away: the centre line stays and theta obeys the wave equation.
-    curvature : "linear", bending energy K |r''|**2/2, the paper's; "true", K phi'**2/2 with phi the direction of the line.
+    radius : R, radius of the discs, >= 0. With R = 0 the centre line does not move and theta obeys the wave equation.
+    curvature : "linear" for the bending energy K |r''|**2/2, the paper's; "true" for K phi'**2/2 with phi the direction of the
+        line.
     stretch_stiffness : A, >= 0, adds A (|r'| - 1)**2/2; only with the true curvature.
 
     Raises
@@ -56,7 +57,7 @@ class Rod:
 
     @property
     def inertia(self) -> float:
-        """M = alpha + rho R**2, inertia per length against rolling while |r'| = 1."""
+        """M = alpha + rho R**2, the inertia of rolling per length while |r'| = 1."""
         return self.spin_inertia + self.density * (self.radius * self.radius)  # a power would raise where this is inf
 
 
@@ -64,7 +65,7 @@ class Rod:
 class SteeredRod(Rod):
     """A rod whose sections have headings phi of their own: the planar Simo-Reissner rod, rolling; see `continuum.elements`.
 
-    Bending is K phi'**2/2. Parameters that are not below are those of `Rod`.
+    The bending energy is K phi'**2/2. Further parameters are those of `Rod`.
 
     Parameters
     ----------
@@ -96,19 +97,19 @@ def _settle(rod: Rod, names: tuple[str, ...], positive: bool = False) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A rod, its law of rolling, its ends, its initial fields and how long it moves.
+    """A rod, its law of rolling, its ends, its initial fields and a duration.
 
     Parameters
     ----------
     rod : the rod.
     initial : a function of the places s (n,) that returns x, y, theta, omega, each (n,); for a `SteeredRod` also phi and its
         rate.
-    duration : time, > 0.
+    duration : duration of the motion, > 0.
     rolling : "field", r. = R omega J r' (the paper's (constraints)), or "unit", r. = R omega J r'/|r'| (constraintsphi).
-    closed : periodic in s rather than with two free ends.
-    shift : for a closed rod, r(s + length) - r(s); (0, 0) is a ring, (length, 0) a straight periodic rod.
-    turns : for a closed `SteeredRod`, whole turns of the heading around it: 1 for a circle.
-    name : for titles.
+    closed : whether the fields are periodic in s; otherwise there are two free ends.
+    shift : for a closed rod, r(s + length) - r(s): (0, 0) for a ring, (length, 0) for a straight periodic rod.
+    turns : for a closed `SteeredRod`, the number of full turns of the heading around it, 1 for a circle.
+    name : a name for titles.
 
     Raises
     ------
@@ -141,10 +142,10 @@ class Scene:
             raise ValueError(f"shift belongs to a closed rod; got shift={self.shift} with closed=False")
         object.__setattr__(self, "shift", tuple(np.asarray(shift).tolist()))
         if self.turns and not (self.closed and self.steered):
-            raise ValueError(f"turns belong to a closed rod with headings of its own; got turns={self.turns} of another")
+            raise ValueError(f"turns belong to a closed rod with headings of its own; got turns={self.turns} for another rod")
 
     def fields(self, s: Float) -> dict[str, Float]:
-        """The initial fields at places s (n,) by name, each (n,); ValueError if `initial` returns other than it should."""
+        """The initial fields at places s (n,) by name, each (n,). ValueError if `initial` does not return what it should."""
         names = ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if self.steered else 4]
         places = s.copy()
         values = self.initial(places)

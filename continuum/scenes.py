@@ -1,4 +1,4 @@
-"""Named scenes. The rod's parameters are the paper's unless given by keyword."""
+"""Named scenes. Parameters of the rod that are not given have the paper's values."""
 
 from functools import partial
 from typing import Unpack
@@ -27,10 +27,10 @@ def _rod(given: RodParameters) -> Rod:
 
 
 def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: Unpack[RodParameters]) -> Scene:
-    """The paper's scene: a straight rod at rest, twisted by theta = -pi twist cos(pi s/length), let go.
+    """The paper's scene: a straight rod at rest, twisted by theta = -pi twist cos(pi s/length) and released.
 
-    `twist` is the number of turns between the two ends, the paper's value 1/2. E(0) = beta pi**4 twist**2/(4 length), which
-    is pi**4/80 for the paper's rod.
+    `twist` is the number of turns between the two ends, in the paper 1/2. E(0) = beta pi**4 twist**2/(4 length), which is pi**4/80
+    for the paper's rod.
     """
     rod = _rod(parameters)
     turns = checks.number("twist", twist)
@@ -46,7 +46,7 @@ def steered_rod(
     twist: float = 0.5,
     **parameters: Unpack[Parameters],
 ) -> Scene:
-    """The paper's twist of a rod whose sections have headings of their own, phi = 0 at rest; see `SteeredRod`."""
+    """The paper's twist for a rod whose sections have headings of their own, at rest with phi = 0; see `SteeredRod`."""
     for name in parameters:
         checks.choice("rod parameter", name, PAPER)
     rod = SteeredRod(
@@ -67,10 +67,10 @@ def rolling_rod(
     amplitude: float = 1e-6,
     **parameters: Unpack[RodParameters],
 ) -> Scene:
-    """A straight rod, periodic up to a shift, that rolls sideways at the rate `omega`, slightly perturbed.
+    """A straight rod, periodic up to a shift, that rolls sideways at the rate `omega`, with a small perturbation.
 
-    The perturbation is what rolling unevenly from the straight line leaves: theta = amplitude cos(q s),
-    y = R theta, q = 2 pi mode/length.
+    The perturbation is the result of uneven rolling from the straight line: theta = amplitude cos(q s), y = R theta,
+    q = 2 pi mode/length.
     """
     rod = _rod(parameters)
     q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
@@ -89,7 +89,7 @@ def rolling_rod(
 
 
 def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float = 0.4, **parameters: Unpack[RodParameters]) -> Scene:
-    """A circle of circumference `length`, all discs rolling at the rate `omega`: towards the centre if it is positive."""
+    """A circle of circumference `length` whose discs all roll at the rate `omega`, towards the centre if it is positive."""
     rod = _rod(parameters)
     initial = partial(_circle, radius=rod.length / (2 * np.pi), omega=checks.number("omega", omega))
     return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, closed=True, name="breathing ring")

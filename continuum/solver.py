@@ -1,4 +1,4 @@
-"""Fields to a tolerance, or by the paper's scheme: `solve(scene, ...)`."""
+"""The solver for fields: `solve(scene, ...)`, to a tolerance or by the paper's scheme."""
 
 import warnings
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from discs.warn import warn
 COARSEST = 33
 FINEST = 8193
 MOST_STEPS = 25 * 2**12
-SLOWEST = 0.9  # ratio of changes from mesh to mesh: errors that fall slower are not told from it
+SLOWEST = 0.9  # largest ratio of changes from mesh to mesh
 
 
 def solve(
@@ -37,50 +37,51 @@ def solve(
 ) -> Solution:
     """The fields of a scene.
 
-    "spectral": Galerkin's method with polynomials, or Fourier series if the scene is closed, refined until it no longer
-    matters; see `continuum.galerkin` and `continuum.spectral`. For slaved headings and linear curvature.
+    Methods:
 
-    "richardson": second-order differences in s on meshes of spacing k, k/2, k/4, ...; two neighbours u_k, u_{k/2} give
-    T = u_{k/2} + (u_{k/2} - u_k)/3, which removes the k^2 term, and three neighbouring T the estimate of what is left: if
-    changes d = |T_{k/2} - T_k| fall by rho from mesh to mesh, d rho/(1 - rho). rho is measured, between 1/4 and 9/10: the rod's
-    ends are not smooth - the curvature grows a thin layer there - so the rest falls like k^2 rather than k^4 (docs/accuracy.md);
-    where the initial fields have corners it falls slower, and rho is at least 1/2. The coarsest mesh sees the initial fields
-    (`continuum.mesh.unseen`).
-    The step of "suzuki4" is halved on the coarsest mesh until its effect is below a quarter of the tolerance; the effect is
-    measured again on the finest mesh but one, and is part of the estimate.
+    "spectral": Galerkin's method with polynomials, or with Fourier series if the scene is closed, refined to the tolerance; see
+    `continuum.galerkin` and `continuum.spectral`. For slaved headings and linear curvature.
 
-    "elements": for headings of their own (`SteeredRod`): spectral elements, more of them until it no longer matters; see
-    `continuum.elements`.
+    "richardson": second-order differences in s on meshes of spacing k, k/2, k/4, ... Two neighbouring meshes u_k, u_{k/2} give
+    T = u_{k/2} + (u_{k/2} - u_k)/3, which removes the k^2 term. Three neighbouring T give the error estimate: if the changes
+    d = |T_{k/2} - T_k| fall by a factor rho from mesh to mesh, it is d rho/(1 - rho). rho is measured, and limited to 1/4 ... 9/10.
+    The rod's ends are not smooth (the curvature has a growing thin layer there), so the error of T falls like k^2 rather than k^4
+    (docs/accuracy.md). If the initial fields have corners it falls more slowly, and rho is at least 1/2. The coarsest mesh resolves
+    the initial fields (`continuum.mesh.unseen`). The step of "suzuki4" is halved on the coarsest mesh until its effect is below a
+    quarter of the tolerance. The effect is measured again on the finest mesh but one, and is part of the estimate.
 
-    "leapfrog": the paper's explicit scheme on n points with step dt, both as in the paper (32, k^2/8) by default: plain
-    springs, end discs of full weight, no error estimate.
+    "elements": spectral elements for a `SteeredRod`, refined to the tolerance; see `continuum.elements`.
+
+    "leapfrog": the paper's explicit scheme on n points with step dt, by default as in the paper (32, k^2/8): plain springs, end
+    discs of full weight, no error estimate.
 
     Parameters
     ----------
-    scene : what to solve.
-    tol : largest error wanted in x, y (length), theta and phi (rad) over nodes and frames; not of "leapfrog". A mapping binds what
-        it names instead, rates too: {"omega": 1e-4, "theta": 1e-5}.
-    method : "spectral", "richardson" or "leapfrog"; "elements" for headings of their own. The first that fits by default.
-    n, dt : points and step of "leapfrog"; the step is below k^2/8 where that would be unstable.
-    frames : number of frames, equally spaced over the duration with both ends, or their times. They cost little: those within a
-        step of the spectral field are on its collocation polynomial.
+    scene : the scene.
+    tol : largest error allowed in x, y (length), theta and phi (rad) over nodes and frames; "leapfrog" ignores it. A mapping sets
+        bounds for the quantities it names, rates too: {"omega": 1e-4, "theta": 1e-5}.
+    method : "spectral", "richardson" or "leapfrog"; "elements" for a `SteeredRod`. The first that fits by default.
+    n, dt : nodes and time step of "leapfrog". The default step is below k^2/8 if that would be unstable.
+    frames : number of frames, equally spaced over the duration with both ends, or their times. They cost little: frames within a
+        step of the spectral field are evaluated on its collocation polynomial.
     progress : show progress on anything that takes over a second.
 
     Returns
     -------
-    Solution on the nodes `s`, with `error_estimate` of x, y, theta, omega, of phi and phi_rate where sections have them, and of the
-    energy: its largest distance over all frames from that of the initial fields, by quadrature. The steps of the spectral field
-    keep the energy to rounding (and what sweeps leave); at frames within steps it is that of the fields shown, and off like them.
+    Solution on the nodes `s`. `error_estimate` has the errors of x, y, theta, omega, for a `SteeredRod` of phi and phi_rate, and of
+    the energy: its largest distance over all frames from the energy of the initial fields, by quadrature. The steps of the spectral
+    field conserve the energy to rounding (and to the tolerance of sweeps). At frames within steps it is the energy of the
+    interpolated fields, and has their error.
 
     Raises
     ------
-    ValueError : for a bad tolerance, method or mesh; for initial fields that jump, or that nothing resolves (`continuum.initial`);
-        when the tolerance is not reached with the most functions or nodes and steps that the method tries.
-    SimulationError : when the motion cannot go on; see `discs.simulate`.
+    ValueError : for a bad tolerance, method or mesh; for initial fields that jump or cannot be resolved (`continuum.initial`); if
+        the tolerance is not reached with the largest number of functions, nodes or steps of the method.
+    SimulationError : if the motion cannot continue; see `discs.simulate`.
     """
     if not isinstance(scene, Scene):
         instead = "; simulate(problem) runs discs" if isinstance(scene, Problem) else ""
-        raise ValueError(f"solve takes a Scene, as untwisting_rod() makes; got {type(scene).__name__}{instead}")
+        raise ValueError(f"solve takes a Scene, such as untwisting_rod(); got {type(scene).__name__}{instead}")
     fitting = ("elements",) if scene.steered else ("richardson", "leapfrog")
     if scene.rod.curvature == "linear" and not scene.steered:
         fitting = ("spectral", *fitting)
@@ -107,14 +108,14 @@ def solve(
 
 def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progress: bool) -> Solution:
     tol = min(bound.values())
-    # sweeps stop well below the tolerance: what each step leaves adds up over the steps
+    # the tolerance of sweeps is far below tol, as their errors add up over the steps
     method = Suzuki4(Midpoint(tolerance=min(1e-10, 1e-5 * tol)))
 
     def mesh(n: int) -> Problem:
         return semidiscretise(scene, n - 1 if scene.closed else n, "consistent")
 
     def run(n: int, steps: int) -> Solution:
-        with warnings.catch_warnings():  # steps that are too long are told by half as long ones
+        with warnings.catch_warnings():  # too long steps show in the comparison with half as long ones
             warnings.simplefilter("ignore")
             return simulate(mesh(n), method, scene.duration / steps, frames, progress=False)
 
@@ -123,7 +124,7 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
         return {f: factor * float(np.abs(getattr(b, f)[:, ::every] - getattr(a, f)).max()) for f in FIELDS}
 
     def effect(whole: Solution, halved: Solution) -> dict[str, float]:
-        """Of a time step, when half of it has at most a quarter of the effect; without a bound if sweeps did not converge."""
+        """The error of a time step, as the half step has at most a quarter of it; infinite if sweeps did not converge."""
         return largest(halved, whole, np.inf if halved.stats["unconverged"] else 4 / 3)
 
     with tqdm(desc=f"field to {tol:g}", unit="run", delay=1, disable=not progress) as bar:
@@ -152,13 +153,13 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
             before, change = change, largest(last, best, 1.0) if last is not None else unknown
             space = {name: change[name] * _rest(change[name], before[name], fastest) for name in FIELDS}
             if over(space, bound) <= 0.75:
-                # the step again, on the coarser of the two meshes that count: waves may be there that COARSEST does not hold
+                # measure the step again on the coarser of the last two meshes: it has waves that the coarsest mesh has not
                 time = effect(coarse, shown(n, 2 * steps))
                 estimate = {name: space[name] + time[name] for name in FIELDS}
                 if over(estimate, bound) <= 1:
                     stats = fine.stats | {"method": "richardson", "order": 2, "nodes": fine.s.size}
                     return replace(best, error_estimate=estimate, rolling_residual=None, stats=stats)
-                # a smaller step, to fall like its third power if not its fourth, and again from two meshes back
+                # a smaller step, assuming an error of at least third order, and again from two meshes back
                 steps *= max(2, 2 ** int(np.ceil(np.log(4 * over(time, bound)) / np.log(8))))
                 n = max(coarsest, (n - 1) // 8 + 1)
                 coarse, last, change = shown(n, steps), None, unknown
@@ -168,7 +169,7 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
 
 
 def _rest(change: float, before: float, fastest: float) -> float:
-    """What is left of the error, as a part of the last change, where changes fall geometrically; infinite after the first."""
+    """The remaining error over the last change, if changes fall geometrically; infinite after the first change."""
     if not np.isfinite(before):
         return np.inf
     rho = min(max(change / before, fastest), SLOWEST) if change else fastest
@@ -176,7 +177,7 @@ def _rest(change: float, before: float, fastest: float) -> float:
 
 
 def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:
-    """T = u_{k/2} + (u_{k/2} - u_k)/3 on the finer nodes, the correction between the coarser ones by a cubic spline."""
+    """T = u_{k/2} + (u_{k/2} - u_k)/3 on the finer nodes; a cubic spline interpolates the correction between the coarser ones."""
     changed = {}
     for name in FIELDS:
         u, v = getattr(fine, name), getattr(coarse, name)
@@ -185,7 +186,7 @@ def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:
 
 
 def spline(scene: Scene, s: Float, values: Float) -> Spline:
-    """Cubic spline in s through values (F, n) that are periodic if the scene is closed; call it for (places, F)."""
+    """Cubic spline in s through values (F, n), periodic if the scene is closed; it returns (places, F)."""
     ends = "not-a-knot"
     if scene.closed:
         s, values, ends = np.append(s, scene.rod.length), np.concatenate([values, values[:, :1]], axis=1), "periodic"

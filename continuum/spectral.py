@@ -1,16 +1,18 @@
-"""Fields of slaved headings to a tolerance, by Galerkin's method (`continuum.galerkin`) with ever more functions and shorter steps.
+"""Fields of slaved headings to a tolerance, by Galerkin's method (`continuum.galerkin`) with more functions and shorter steps.
 
-The error is measured, not extrapolated: a motion on m_j functions is compared with one on m_{j+1} functions, and each measures the
-one before. The tolerance of steps (`continuum.stepping`) falls for the first three, so that one difference shows the errors of
-functions and of steps; then it stays, and errors of steps are measured by a motion of their own. Where a difference is more than a
-third of the last one, shorter steps on the same functions show which of the two is to blame; if it is the steps, their tolerance
-falls again and the functions go back by a size.
+The error is measured: a motion on m_j functions is compared with one on m_{j+1} functions, so each motion measures the one before.
 
-The finer motion errs too. With a ratio p of its error to that of the coarser one the difference d is (1 - p) times the error, so
-the estimate is d/(1 - p): p from the last two differences, at least 1/3, and 1/2 where there is only one (4/5 where initial fields
-are narrow, as functions that do not hold them change little). (The corner s = 0, t = 0,
-where the initial twist breaks a condition of the ends, leaves waves of wave number q and size q^-6 or less in theta: errors fall
-like a power in the end, of the steps like their third; of omega, whose waves have the size q^-4, like their square.)
+1. The tolerance of steps (`continuum.stepping`) falls for the first three motions, so that one difference shows the errors of
+   functions and of steps together. Then it is constant, and the errors of steps are measured by a separate motion.
+2. If a difference is more than a third of the last one, a motion with shorter steps on the same functions shows which of the two
+   errors dominates. If it is that of the steps, their tolerance falls again, and the number of functions goes back by one size.
+3. The finer motion has an error too. Let p be the ratio of its error to that of the coarser one. Then the difference d is (1 - p)
+   times the error of the coarser one, and the estimate is d/(1 - p). p is taken from the last two differences, and is at least
+   1/3. If there is only one difference p is 1/2, or 4/5 if the initial fields are narrow, because functions that do not resolve
+   narrow fields change little.
+
+At the corner s = 0, t = 0 the initial twist violates an end condition. This leaves waves of wave number q and size q^-6 or less in
+theta, and q^-4 in omega. So the errors finally fall like a power of the step, the third for theta, the second for omega.
 """
 
 from collections.abc import Mapping
@@ -31,23 +33,23 @@ from discs.running.stats import Stats
 from discs.skew import Phase
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
-NODES = 1025  # of a solution, so many that splines through them do for derivatives too; more where initial fields are narrow
+NODES = 1025  # nodes of a solution, enough for splines and their derivatives; more if the initial fields are narrow
 MOST_NODES = 8192
-LOOSEST = 2e-4  # tolerance of a step
-FAR = 100.0  # times the tolerance: errors above that are not yet for shorter steps to mend
-LEAST, MOST = 1 / 3, 0.8  # what a finer motion errs by, over the error of the coarser one
-RATE = 0.5  # the least of that for omega
-SAME = 0.05  # of the time: two motions that end so near to each other end there
-BENT = 1e-3  # curvature times the length at a free end, from which on a line is said to start bent there
+LOOSEST = 2e-4  # largest tolerance of a step
+FAR = 100.0  # times the tolerance: for larger errors shorter steps are not tried
+LEAST, MOST = 1 / 3, 0.8  # limits of p, the error of a finer motion over that of the coarser one
+RATE = 0.5  # least p of omega
+SAME = 0.05  # relative: the end of a motion is real if two motions agree on its time to this
+BENT = 1e-3  # curvature times the length: above it a line counts as bent at a free end
 
 
 class Plan(NamedTuple):
-    """How functions and steps are searched for.
+    """The search strategy for functions and steps.
 
-    more : tolerances of the fields below which the search begins one size further.
-    first : the tolerance of a step in the first motion, over that of the fields. finer : how often it falls.
-    slow : of the last error; one above that falls slowly.
-    unknown : what the second motion is thought to err by, over the error of the first.
+    more : the search starts one size further for each of these that the tolerance of the fields is below.
+    first : tolerance of a step in the first motion, over that of the fields. finer : number of times it falls.
+    slow : ratio of the last two errors above which errors fall slowly.
+    unknown : assumed ratio of the error of the second motion to that of the first.
     """
 
     more: tuple[float, ...]
@@ -58,7 +60,7 @@ class Plan(NamedTuple):
 
 
 PLAN = Plan(more=(3e-4, 3e-6, 3e-8), first=0.5, finer=2, slow=1 / 3, unknown=0.5)
-# short waves of narrow fields fill the rod: errors of the functions fall like n^-2.7, and a step passes many waves
+# narrow fields send short waves through the rod: errors of the functions fall like n^-2.7, and a step passes many waves
 NARROW = Plan(more=(0.5, 2e-2, 3e-3, 3e-4, 3e-5, 2e-5), first=0.3, finer=1, slow=0.6, unknown=0.8)
 NARROW_STAGES = 12
 
@@ -66,10 +68,10 @@ NARROW_STAGES = 12
 class Motion(NamedTuple):
     """A motion on n functions.
 
-    rod, states : the functions, and the states at the times, some at once.
+    rod, states : the system, and its states at the times, in groups.
     fields : (F, S) by name.
-    start : largest error of the fields at the start, (S,), by name.
-    tolerance : of a step. steps : their number.
+    start : largest error of the fields at the start, by name.
+    tolerance : of a step. steps : number of steps.
     """
 
     rod: SpectralRod
@@ -81,18 +83,18 @@ class Motion(NamedTuple):
     steps: int
 
 
-class Course:
-    """Motions of a scene on n functions.
+class Runner:
+    """Runs motions of a scene on n functions.
 
     Parameters
     ----------
-    times : (F,), when fields are compared and given.
-    stages : of steps.
-    compiled : whether steps are taken by `continuum.kernels`, or by their plain twin.
+    times : (F,), the times at which fields are compared and returned.
+    stages : number of stages of a step.
+    compiled : whether to use `continuum.kernels` or the plain twin.
 
     Attributes
     ----------
-    s : (S,), where fields are given.
+    s : (S,), the places at which fields are returned.
     """
 
     def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool = True) -> None:
@@ -104,7 +106,7 @@ class Course:
             nodes *= 2
         self.s = length / nodes * np.arange(nodes + (not scene.closed), dtype=float)
         self._density = Density.of(initial)
-        self._first = scene.duration / 16  # step to begin with
+        self._first = scene.duration / 16  # length of the first step
 
     def run(self, n: int, tolerance: float) -> Motion:
         rod = SpectralRod(self._scene, n, self._density)
@@ -120,12 +122,12 @@ class Course:
 
 
 def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
-    """Largest difference of each field."""
+    """The largest difference in each field."""
     return {name: float(np.abs(a[name] - b[name]).max()) for name in FIELDS}
 
 
 def bent_hint(scene: Scene) -> str:
-    """What to say of a scene that starts bent at a free end, against the end's condition x'y'' = y'x''; empty of others."""
+    """A hint for scenes that start bent at a free end, which violates the end condition x'y'' = y'x''; empty for others."""
     if scene.closed or not scene.rod.bending_stiffness or not scene.rod.radius:
         return ""
     length = scene.rod.length
@@ -146,12 +148,12 @@ class Search:
 
     Parameters
     ----------
-    bound : largest errors wanted, by field.
+    bound : largest errors allowed, by field.
 
     Attributes
     ----------
-    course : what runs motions.
-    estimate : of the errors of the last motion that was measured, by field.
+    runner : runs the motions.
+    estimate : estimated errors of the last motion that was measured, by field.
     """
 
     def __init__(self, scene: Scene, bound: Mapping[str, float], times: Float, bar: tqdm) -> None:
@@ -159,7 +161,7 @@ class Search:
         tol = min(bound.values())
         narrow = bool(resolve(scene).features)
         self._plan = NARROW if narrow else PLAN
-        self.course = Course(scene, times, NARROW_STAGES if narrow else stages_for(tol))
+        self.runner = Runner(scene, times, NARROW_STAGES if narrow else stages_for(tol))
         self.estimate = dict.fromkeys(FIELDS, np.inf)
         self._change = np.inf  # of the last two motions, over its bound
 
@@ -169,7 +171,7 @@ class Search:
         start = sum(tol < below for below in self._plan.more)
         sizes = SIZES[min(start, len(SIZES) - 2) :]
         tolerance = min(self._plan.first * tol, LOOSEST)
-        stages = self.course.stages
+        stages = self.runner.stages
         finest = tolerance
         for _ in range(self._plan.finer):
             finest = finer(finest, stages)
@@ -184,14 +186,14 @@ class Search:
                     if self._plan.slow * before < self._change < FAR:
                         shorter = self._run(n, found.tolerance / float(np.clip(2 * self._change, 4.0, 30.0)))
                         by_steps = over(distances(found.fields, shorter.fields), self._bound)
-                        if by_steps > self._plan.slow * self._change:  # shorter steps then, and functions as before
+                        if by_steps > self._plan.slow * self._change:  # the steps dominate: shorter ones, functions as before
                             last, found = self._run(fewer, coarser(shorter.tolerance, stages)), shorter
                             if self._reached(last, found):
                                 return last
                             tolerance, finest = shorter.tolerance, finer(shorter.tolerance, stages)
             except SimulationError as error:
                 if failure and abs(error.time - failure.time) <= SAME * failure.time:
-                    # the earlier one: rounding, which grows where r' vanishes, may carry the other beyond the end
+                    # the earlier one, as rounding, which grows where r' vanishes, may have carried the other beyond the end
                     raise min(failure, error, key=lambda e: (isinstance(e, TooFast), e.time)) from None
                 failure, last, self._change = error, None, np.inf
                 continue
@@ -203,7 +205,7 @@ class Search:
     def _run(self, n: int, tolerance: float) -> Motion:
         self._bar.set_postfix(functions=n, refresh=False)
         self._bar.update()
-        return self.course.run(n, tolerance)
+        return self.runner.run(n, tolerance)
 
     def _reached(self, coarse: Motion, fine: Motion) -> bool:
         """Whether the coarser motion is within the bounds."""
@@ -214,15 +216,15 @@ class Search:
         self.estimate = {name: max(error / (1 - ratios[name]), coarse.start[name]) for name, error in change.items()}
         if over(self.estimate, self._bound) > 1:
             return False
-        if fine.tolerance >= coarse.tolerance:  # both err alike by their steps
-            shorter = self._run(coarse.n, finer(coarse.tolerance, self.course.stages))
+        if fine.tolerance >= coarse.tolerance:  # both have the same error of steps, which the difference does not show
+            shorter = self._run(coarse.n, finer(coarse.tolerance, self.runner.stages))
             by_steps = distances(coarse.fields, shorter.fields)
             self.estimate = {name: error + by_steps[name] / (1 - LEAST) for name, error in self.estimate.items()}
         return over(self.estimate, self._bound) <= 1
 
 
 def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
-    """The fields of a scene with slaved headings at `times` (F,), within the bounds by name; see `continuum.solve`."""
+    """The fields of a scene with slaved headings at `times` (F,), within bounds by name; see `continuum.solve`."""
     with (
         tqdm(desc=f"field to {min(bound.values()):g}", unit="run", delay=1, disable=not progress) as bar,
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),
@@ -245,4 +247,4 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progr
     }
     energy, slip = (np.concatenate([f(z) for z in found.states]) for f in (found.rod.energies, found.rod.slip))
     x, y, theta, omega = (found.fields[name] for name in FIELDS)
-    return Solution(times, search.course.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate)
+    return Solution(times, search.runner.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate)

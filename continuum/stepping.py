@@ -1,17 +1,17 @@
 """Motions of a rod on n functions in Gauss steps of variable length.
 
-The collocation polynomial of a step with s stages is of degree s in time. The size of its highest Legendre coefficient at the
-nodes, in x, y and theta, is taken as the step's error, and its length chosen so that this is the tolerance (per step; what it makes
-of the whole motion is measured by `continuum.spectral`). That bounds the polynomial and not only its end, which is more accurate
-where the motion is smooth; waves that a step does not resolve spoil the ends too. So states within a step are those of the
-polynomials (`collocation.within`) and cost no step of their own; Gauss steps keep the energy from end to end, not within. A step
-that does not converge, or takes many sweeps, makes the next one shorter.
+**Length of steps.** The collocation polynomial of a step with s stages has degree s in time. The error of the step is taken to be
+the size of its highest Legendre coefficient at the nodes, in x, y and theta. The length is chosen so that the error is the
+tolerance of a step; `continuum.spectral` measures the resulting error of the motion. This bounds the error of the polynomial, not
+only that of its end, which is more accurate if the motion is smooth; waves that a step does not resolve spoil its end, too. So
+states within a step are those of the polynomial (`collocation.within`) and need no extra steps. Gauss steps conserve the energy
+from end to end, but not within. If a step does not converge, or takes many sweeps, the next one is shorter.
 
-Long steps must not jump over the end of a motion: under the unit law a heading is lost where z = r' vanishes, at a point or, when a
-ring collapses, everywhere. A step in which Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at a node, or where z is nearest to zero on the
-straight way from a node to the next, is taken again with half its length. So the least |r'| at most halves in a step, and once it
-is below `LOST_HEADING` before such a step the heading is lost. No other motion ends: where steps become too short without that, the
-motion is too fast for them.
+**End of a motion.** Long steps must not jump over the end of a motion: for the unit law a heading is lost where z = r' vanishes, at
+a point or, when a ring collapses, everywhere. z is checked at each node, and where it is nearest to zero on the straight line
+from a node to the next. If Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at one of these, the step is repeated with half its length. So the
+least |r'| at most halves in a step. If it is below `LOST_HEADING` before such a step, the heading is lost. No other motion ends:
+if steps become too short for another reason, the motion is too fast for them.
 """
 
 from collections.abc import Iterator
@@ -26,55 +26,56 @@ from discs.arrays import Complex, Float
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Phase
 
-STAGES = ((7e-5, 4), (1.4e-6, 6), (1.4e-8, 8), (0.0, 12))  # from which tolerance of the fields on
+STAGES = ((7e-5, 4), (1.4e-6, 6), (1.4e-8, 8), (0.0, 12))  # smallest tolerance of the fields for each number of stages
 SWEEPS = 40
-FEW_SWEEPS = 18  # steps that take more are made shorter
-MODES = 0.4  # sweeps that new modes cost, times stages over functions
-ACCEPTED = 2.0  # times the tolerance
-SHORTEST = 1e-9  # of the duration, or of the time that waves take along the rod
-LONGEST = 1e3  # of that time: a first step
+FEW_SWEEPS = 18  # after a step with more sweeps the next one is shorter
+MODES = 0.4  # cost of new modes: this times functions over stages, in sweeps
+ACCEPTED = 2.0  # largest error of a step, over the tolerance
+SHORTEST = 1e-9  # shortest step, relative to the duration or to the time in which waves cross the rod
+LONGEST = 1e3  # longest first step, relative to that time
 MOST_STEPS = 2**14
-FORETOLD, LONGER = 256, 1.5  # every so many steps: whether those that are left, by the last half of them, are so much too many
-TOGETHER = 256  # states that are formed at once
+FORETOLD = 256  # the number of steps still needed is predicted after every so many steps, from the last half of them
+LONGER = 1.5  # ratio of predicted to remaining steps above which the run ends
+TOGETHER = 256  # states evaluated at once
 
 
 def stages_for(tol: float) -> int:
-    """Stages of the steps for fields to a tolerance. Tolerances of steps are comparable for equal numbers of stages only."""
+    """The number of stages for a tolerance of the fields. Tolerances of steps are comparable for equal numbers of stages only."""
     return next(number for least, number in STAGES if tol >= least)
 
 
 def finer(tolerance: float, stages: int) -> float:
-    """A tolerance for which steps are about 1.5 times shorter, by their order s/2; errors of order 3 then fall to a third."""
+    """A tolerance that makes steps about 1.5 times shorter, by their order s/2; errors of order 3 then fall to a third."""
     return tolerance / min(float(1.5 ** (stages / 2 + 1)), 8.0)
 
 
 def coarser(tolerance: float, stages: int) -> float:
-    """A tolerance for which they are as much longer."""
+    """A tolerance that makes steps longer by the same factor."""
     return tolerance**2 / finer(tolerance, stages)
 
 
 def sweeps(tolerance: float) -> float:
-    """The tolerance of the sweeps of such a step, in units of a rod's scale."""
+    """The tolerance of sweeps for a tolerance of steps, in units of the scale of the rod."""
     return min(1e-8, 1e-2 * tolerance)
 
 
 class TooFast(SimulationError):
-    """Steps became too short, or too many."""
+    """Steps became too short or too many."""
 
 
 class Steps:
-    """A rod's motion from its start, step by step.
+    """A motion of a rod from its start, step by step.
 
     Parameters
     ----------
-    duration : to which steps are taken.
+    duration : time at which the last step ends.
     tolerance, stages : of a step.
     first : length of the first step that is tried.
-    compiled : whether steps are taken by `continuum.kernels`, or by their plain twin.
+    compiled : whether to use `continuum.kernels` or the plain twin.
 
     Attributes
     ----------
-    lengths : of the steps taken.
+    lengths : lengths of the steps taken.
     """
 
     def __init__(
@@ -84,14 +85,14 @@ class Steps:
         self._stages = stages
         self._sweeps = sweeps(tolerance)
         nodes, _ = legendre.leggauss(self._stages)
-        self._series = np.linalg.inv(legendre.legvander(nodes, self._stages - 1))[-2:]  # of the rates of the stages
+        self._series = np.linalg.inv(legendre.legvander(nodes, self._stages - 1))[-2:]  # rates of stages to last coefficients
         self._next = min(first, LONGEST * rod.crossing)
         self._modes: Modes | None = None
-        self._usual, self._excess = 0, 0  # sweeps of a step with its own modes; how many more it took since
+        self._usual, self._excess = 0, 0  # sweeps of the step that computed the modes; additional sweeps of the steps since
         self.lengths: list[float] = []
 
     def at(self, times: Float) -> Iterator[Phase]:
-        """The states at times (F,), increasing, some at once: arrays have one more axis before their own."""
+        """The states at times (F,), increasing, in groups: arrays have one more leading axis."""
         t, z = 0.0, self.rod.start
         while times.size:
             if times[0] <= t:
@@ -107,7 +108,7 @@ class Steps:
             times = times[inside.size :]
 
     def _step(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:
-        """As `collocation.step`: with the modes of an earlier step as long as they save more than they cost."""
+        """As `collocation.step`. The modes of an earlier step are used as long as this saves time."""
         fresh = self._modes is None or self._excess > MODES * self.rod.n / self._stages
         while True:
             if fresh:
@@ -127,7 +128,7 @@ class Steps:
         return collocation.step(self.rod, z, self._modes, t, h, self._stages, SWEEPS, self._sweeps, self._compiled)
 
     def _advance(self, t: float, z: Phase) -> tuple[float, Phase, Float, Float]:
-        """One step from z at t that converges and is within the tolerance, and the rates and momenta of its stages."""
+        """One converged step from z at t within the tolerance, with the rates and momenta of its stages."""
         slopes = self._slopes(z)
         while True:
             left = self._duration - t
@@ -150,7 +151,7 @@ class Steps:
             return (self._duration if h == left else t + h), after, v, p
 
     def _turned(self, slopes: Complex, after: Phase) -> bool:
-        """Whether a heading may have been lost within a step, from slopes (n,) before it."""
+        """Whether a heading may have been lost within a step, given the slopes (n,) before it."""
         if not self.rod.law.vanishing:
             return False
         part = _nearest(slopes)
@@ -158,12 +159,12 @@ class Steps:
         return bool(((now.conj() * then).real < 0.5 * np.abs(now) ** 2).any())
 
     def _slopes(self, z: Phase) -> Complex:
-        """r' at the nodes; around a closed rod, to the first again."""
+        """r' at the nodes; for a closed rod the first is repeated at the end."""
         slopes = self.rod.slopes(z)
         return np.append(slopes, slopes[0]) if self.rod.closed else slopes
 
     def _error(self, v: Float, h: float) -> float:
-        """Size of the highest coefficient in time of x, y, theta; of the last but one where that is far larger."""
+        """Size of the highest coefficient in time of x, y, theta; of the last but one if that is far larger."""
         degrees = 2 * np.array([self._stages - 2, self._stages - 1]) + 1
         q = h / 2 * np.tensordot(self._series, v, 1) / degrees[:, None, None]
         sizes = np.maximum(np.abs(q[:, :2] @ self.rod.line.T).max(axis=(1, 2)), np.abs(q[:, 2]).max(axis=1))
@@ -177,7 +178,7 @@ class Steps:
             raise SimulationError(message, len(self.lengths), t, node)
 
     def _check_number(self, t: float) -> None:
-        """Raise ValueError where steps are too many, or will be."""
+        """Raise ValueError if there are too many steps, or there will be."""
         taken, last = len(self.lengths), self.lengths[-FORETOLD // 2 :]
         enough = MOST_STEPS - taken
         foretold = taken and taken % FORETOLD == 0
@@ -195,7 +196,7 @@ class Steps:
 
 
 def _nearest(slopes: Complex) -> Float:
-    """Where r' is nearest to zero on the straight way from each node to the next, in [0, 1], (n - 1,)."""
+    """Where r' is nearest to zero on the straight line from each node to the next, in [0, 1], (n - 1,)."""
     move = np.diff(slopes)
     part: Float = -(slopes[:-1].conj() * move).real / np.maximum(np.abs(move) ** 2, 1e-300)
     return np.clip(part, 0.0, 1.0)

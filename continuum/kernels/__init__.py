@@ -1,1 +1,1 @@
-"""The field's time steps in compiled form (numba), the twin of a plain form in NumPy."""
+"""Compiled time steps of the field (numba). The plain twin is `continuum.collocation`."""

@@ -1,4 +1,4 @@
-"""`python -m continuum.kernels`: compile the field's kernels now, once on a machine, so that no run has to wait for it."""
+"""`python -m continuum.kernels`: compile the kernels of the field once per machine, so that no run waits for it."""
 
 from continuum.scenes import untwisting_rod
 from continuum.solver import solve

@@ -1,4 +1,4 @@
-"""Anderson's mixing of sweeps, of depth 2; the plain twin is `continuum.collocation.mixing`."""
+"""Anderson mixing of sweeps, of depth 2; the plain twin is `continuum.collocation.mixing`."""
 
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ def dot(a, b):
 
 @part
 def blend(x, count, factors, out):
-    """out (m,), put into x (3, m) in place of the oldest, becomes sum_j factors[j] x_j, the newest first."""
+    """Replace out (m,) by sum_j factors[j] x_j, the newest first, after storing it in x (3, m) in place of the oldest."""
     now, before, first = x[count % 3], x[(count - 1) % 3], x[(count - 2) % 3]
     for i in range(out.size):
         now[i] = out[i]
@@ -34,9 +34,9 @@ def blend(x, count, factors, out):
 
 @part
 def mix(history, count, change, v, p):
-    """v, p = the mixture of what the last sweeps made of them; this one, `count` after the first, changed v by `change`.
+    """Replace the rates v and momenta p by a mixture of those after the last sweeps. Sweep number `count` changed v by `change`.
 
-    All (m,). The factors have the sum one, and changes add up by them to the least.
+    All are (m,). The factors have the sum one and make the sum of the changes the smallest.
     """
     f, g, k = history.changes[count % 3], history.changes[(count - 1) % 3], history.changes[(count - 2) % 3]
     for i in range(f.size):

@@ -1,7 +1,7 @@
 """A rod on n functions as a compiled chain; the plain twin is `continuum.galerkin.SpectralRod`.
 
-All stages of a step are taken at once, as matrices are full: arrays have a row for each of the s stages, F finer points. For what
-guides the sweeps of a step see `continuum.collocation`.
+All stages of a step are computed at once, because the matrices are full: arrays have a row for each of the s stages. F is the
+number of finer points. `continuum.collocation` describes the sweeps.
 """
 
 from typing import Any, NamedTuple
@@ -18,11 +18,11 @@ from discs.skew import Parameters
 
 
 class Spectral(NamedTuple):
-    """Parameters. The matrices and weights are those of `continuum.functions.Functions`, for row vectors on their left.
+    """Parameters. Matrices and weights are those of `continuum.functions.Functions`, for row vectors on their left.
 
-    bends : (n, n + 3 F). rates : (n, 3 F), back : (3 F, n). project : (F + n, n), pull : (n, F + n). bending : (n,).
+    bends : (n, n + 3 F). rates : (n, 3 F). back : (3 F, n). project : (F + n, n). pull : (n, F + n). bending : (n,).
     torsion : (n, n). twist : (n,), moment of the initial twist. mass, spin : (n,), w rho and w alpha. scale : (3,).
-    modes : `continuum.galerkin.Modes`, of a configuration not far away.
+    modes : `continuum.galerkin.Modes` of a nearby configuration.
     """
 
     bends: Float
@@ -43,7 +43,7 @@ class Spectral(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """C, and room to work in.
+    """C at the stages, and workspace.
 
     e : (s, n) and t : (s, n), 1/sqrt(w (alpha + rho |e|^2)), at the nodes. finer : (s, 3, F), e'', 2 e', e.
     xy : (2 s, n), rows x and y of each stage. line : (2 s, n + 3 F). omega : (s, n). rates : (s, 3 F). moves : (2 s, F + n).
@@ -60,9 +60,9 @@ class Stages(NamedTuple):
 
 
 class Room(NamedTuple):
-    """c of the stages, and what guides the sweeps. z : (1, n), complex. parts, modal : (2 pairs, n), real and imaginary parts.
+    """Workspace of the sweeps. c : C at the stages. z : (1, n), complex. parts, modal : (2 pairs, n), real and imaginary parts.
 
-    guess : (s, 3, n), the rates that a sweep began with, and how it changed them. history : of the last sweeps.
+    guess : (s, 3, n), the rates before a sweep, and then their change. history : the last sweeps.
     """
 
     c: Stages

@@ -178,9 +178,9 @@ def test_fields_of_solve_balance():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rod": steered_rod().rod}, "balances are those of a Rod with curvature='linear'; got SteeredRod"),
+        ({"rod": steered_rod().rod}, "balances need a Rod with curvature='linear'; got SteeredRod"),
         ({"rolling": "sliding"}, "rolling must be one of 'field', 'unit'; got 'sliding'"),
-        ({"rolling": None}, "rolling=None is for the free rod, whose motion has x_rate, y_rate and tension"),
+        ({"rolling": None}, "rolling=None needs a motion of the free rod, with x_rate, y_rate and tension"),
         ({"frames": 2}, "balances need at least 3 frames and 8 nodes; got 2 and 9"),
         ({"n": 7}, "balances need at least 3 frames and 8 nodes; got 5 and 7"),
     ],

@@ -211,14 +211,14 @@ def test_residual_is_the_gradient_of_the_action_sum(closed):
 def test_bad_theories():
     free = sum(STRING)
     for arguments, message in (
-        ((free + u[n + 2, i], u), r"L_d must be in values of the levels n, n \+ 1; got u\[n \+ 2, i\]"),
-        ((free + x[n, i], u), r"L_d must be in values of u; got x\[n, i\]"),
+        ((free + u[n + 2, i], u), r"L_d must depend on values at the levels n, n \+ 1 only; got u\[n \+ 2, i\]"),
+        ((free + x[n, i], u), r"L_d must depend on values of u only; got x\[n, i\]"),
         ((free + u[n, 2 * i], u), r"must be at whole steps from \[n, i\], such as x\[n \+ 1, i - 1\]; got u\[n, 2\*i\]"),
         ((free + u[n], u), r"must be at whole steps from \[n, i\]"),
-        ((free, (u, x)), r"L_d must have values of levels n and n \+ 1 of each field"),
-        ((free, u, u[n, i]), "a constraint must have velocities"),
-        ((free, u, velocity(u) + u[n + 1, i]), r"phi_half must be in values of the levels n; got u\[n \+ 1, i\]"),
-        ((free, u, Constraint(velocity(u), None, u[n + 2, i])), r"phi_d must be in values of the levels n - 1, n, n \+ 1"),
+        ((free, (u, x)), r"L_d must contain values of each field at levels n and n \+ 1"),
+        ((free, u, u[n, i]), "a constraint must contain velocities"),
+        ((free, u, velocity(u) + u[n + 1, i]), r"phi_half must depend on values at the levels n only; got u\[n \+ 1, i\]"),
+        ((free, u, Constraint(velocity(u), None, u[n + 2, i])), r"phi_d must depend on values at the levels n - 1, n, n \+ 1 only"),
         ((free, u, velocity(u), "backward"), "difference must be one of 'forward', 'central'; got 'backward'"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -263,7 +263,7 @@ def test_corner_s_error_is_measured(monkeypatch):
     [
         (
             bumped(lambda s: np.exp(-(((s - 2.13) / 1e-3) ** 2))),
-            r"do not hold the initial fields: they vary within 0.001 at s = 2.13",
+            r"do not resolve the initial fields: they vary within 0.001 at s = 2.13",
         ),
         (
             bumped(np.zeros_like, lambda s: np.exp(-(((s - 1.5) / 1e-3) ** 2))),

@@ -6,7 +6,7 @@ from tqdm import tqdm
 
 from continuum import Rod, Scene, breathing_ring, exact, solve, stepping, untwisting_rod
 from continuum.galerkin import SpectralRod
-from continuum.spectral import Course, Search
+from continuum.spectral import Runner, Search
 from continuum.stepping import Steps, stages_for
 from discs import SimulationError
 from discs.kernels import limits
@@ -22,8 +22,8 @@ def largest(a, b):
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
 def test_a_motion_errs_by_about_the_tolerance_of_its_steps(rolling, tolerance):
     """The paper's scene on 37 functions against steps of a far smaller tolerance; every number of stages."""
-    course = Course(untwisting_rod(rolling), np.array([2.0, 4.5]), stages_for(3 * tolerance))
-    error = largest(course.run(37, tolerance).fields, course.run(37, 1e-3 * tolerance).fields)
+    runner = Runner(untwisting_rod(rolling), np.array([2.0, 4.5]), stages_for(3 * tolerance))
+    error = largest(runner.run(37, tolerance).fields, runner.run(37, 1e-3 * tolerance).fields)
     assert 0.03 * tolerance < error < 20 * tolerance
 
 
@@ -58,7 +58,7 @@ def test_frames_within_steps_are_as_accurate_as_ends(rolling, tolerance):
     middles = np.concatenate([(ends[1:] + ends[:-1]) / 2, 0.1 * ends[1:] + 0.9 * ends[:-1], 0.8 * ends[1:] + 0.2 * ends[:-1]])
     errors = []
     for times in (ends, np.sort(middles)):
-        a, b = (Course(scene, times, *rest[:1]).run(27, rest[1]).fields for rest in ((stages, tolerance), (12, 1e-4 * tolerance)))
+        a, b = (Runner(scene, times, *rest[:1]).run(27, rest[1]).fields for rest in ((stages, tolerance), (12, 1e-4 * tolerance)))
         errors.append((largest(a, b), np.abs(a["omega"] - b["omega"]).max()))
     assert errors[1][0] < 2 * errors[0][0] < 40 * tolerance
     assert errors[1][1] < 2 * errors[0][1]
@@ -67,7 +67,7 @@ def test_frames_within_steps_are_as_accurate_as_ends(rolling, tolerance):
 def test_the_estimate_covers_all_frames(rolling):
     """Largest errors of every field over 101 frames against 97 functions in small steps."""
     times = np.linspace(0, 4.5, 101)
-    truth = Course(untwisting_rod(rolling), times, 12).run(71, 1e-10).fields
+    truth = Runner(untwisting_rod(rolling), times, 12).run(71, 1e-10).fields
     for tol in (1e-3, 1e-4, 1e-5, 1e-6):
         field = solve(untwisting_rod(rolling), tol, progress=False)
         for name, value in truth.items():
@@ -78,7 +78,7 @@ def test_the_estimate_covers_all_frames(rolling):
 
 def test_both_engines_agree(rolling):
     times = np.array([0.0, 1.3, 4.5])
-    a, b = (Course(untwisting_rod(rolling, length=3.0, radius=0.8), times, 4, compiled).run(15, 1e-4) for compiled in (True, False))
+    a, b = (Runner(untwisting_rod(rolling, length=3.0, radius=0.8), times, 4, compiled).run(15, 1e-4) for compiled in (True, False))
     assert a.steps == b.steps
     for name, value in a.fields.items():
         np.testing.assert_allclose(value, b.fields[name], atol=1e-6, err_msg=name)
@@ -175,7 +175,7 @@ def test_a_step_s_error_is_its_highest_coefficient(stages):
 def test_what_functions_miss_of_the_start_is_estimated():
     """Though two motions do not differ."""
     search = Search(untwisting_rod(), {"theta": 1e-3}, np.array([4.5]), tqdm(disable=True))
-    found = search.course.run(19, 1e-3)
+    found = search.runner.run(19, 1e-3)
     missed = found._replace(start=found.start | {"omega": 0.7})
     assert search._reached(missed, found._replace(tolerance=1e-4))
     assert search.estimate["omega"] == 0.7
