@@ -58,12 +58,12 @@ def untwisting_chain(
     ------
     ValueError : for an unknown parameter, or a value outside its range.
     """
-    own = checks.choice("rolling", rolling, (*ROLLING, "own")) == "own"
-    standard = PAPER | STEERED if own else PAPER
+    steered = checks.choice("rolling", rolling, (*ROLLING, "own")) == "own"
+    standard = PAPER | STEERED if steered else PAPER
     for name in parameters:
-        checks.choice("parameter of the chain" + (" (own headings)" if own else ""), name, standard)
+        checks.choice("parameter of the chain" + (" (own headings)" if steered else ""), name, standard)
     given: dict[str, Any] = {"n": n, "ends": ends} | standard | parameters
-    checks.choice("ends (a straight rod)", ends, ("springs",) if own else ("springs", "consistent", "paper"))
-    chain: Chain | SteeredChain = SteeredChain(**given) if own else Chain(**given, rolling=rolling)
+    checks.choice("ends (a straight rod)", ends, ("springs",) if steered else ("springs", "consistent", "paper"))
+    chain: Chain | SteeredChain = SteeredChain(**given) if steered else Chain(**given, rolling=rolling)
     x, y, theta, omega = twisted(chain.s, chain.length, np.pi * checks.number("twist", twist))
-    return Problem(chain, State(x, y, theta, omega, phi=0 * x if own else None), duration)
+    return Problem(chain, State(x, y, theta, omega, phi=0 * x if steered else None), duration)

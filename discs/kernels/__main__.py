@@ -11,7 +11,7 @@ from discs.problem import Problem, State
 from discs.simulation import simulate
 
 ONES = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius")
-OWN = ("heading_inertia", "stretch_stiffness", "shear_stiffness")
+STEERED = ("heading_inertia", "stretch_stiffness", "shear_stiffness")
 
 
 def sharing() -> list[list[Integrator]]:
@@ -26,11 +26,11 @@ def sharing() -> list[list[Integrator]]:
 
 def compile_for(law: str) -> None:
     """Compile every kernel for one kind of chain: slaved headings with this law of rolling, or "own" headings."""
-    own = law == "own"
-    values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + OWN if own else ONES, 1.0)
-    chain: Chain | SteeredChain = SteeredChain(**values) if own else Chain(**values, rolling=law)
-    words = "discs with own headings" if own else f"discs with slaved headings, {law} law"
-    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if own else None), 0.01)  # at rest
+    steered = law == "own"
+    values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + STEERED if steered else ONES, 1.0)
+    chain: Chain | SteeredChain = SteeredChain(**values) if steered else Chain(**values, rolling=law)
+    words = "discs with own headings" if steered else f"discs with slaved headings, {law} law"
+    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if steered else None), 0.01)  # at rest
     for methods in sharing():
         simulate(problem, methods[0], 0.005, frames=1, progress=False)
         print(f"{words}: {', '.join(method.name for method in methods)} compiled", flush=True)

@@ -1,7 +1,7 @@
-"""The interface of compiled chains, methods, laws and loads: stubs, filled in by the type of their first argument.
+"""The interface of compiled chains, methods, laws and loads: stubs with a form for each type of their first argument.
 
 `chain` and `method` are NamedTuples of parameters. Arrays: positions and moves (rows, n); momenta (columns, n), one column for roll
-and, with own headings, one for turning. `work` is the result of `workspace`: arrays that the functions of a chain share, among them
+and, for steered discs, one for turning. `work` is the result of `workspace`: arrays that the functions of a chain share, among them
 the shape of the base position. Moves are relative to the base position.
 """
 
@@ -35,9 +35,10 @@ def gradient(chain, work, move, g):
 
 @stub
 def sweep(chain, work, state, t, h, p, move, first):
-    """One sweep, the first or a later one, of a midpoint step from `state` at the time t: changes p and the half step `move`.
+    """One sweep (the `first` or a later one) of a midpoint step from `state` at the time t: changes p and the half step `move`.
 
-    Returns the largest change of the move, in units of its scale."""
+    Returns the largest change of the move, in units of its scale.
+    """
 
 
 @stub
@@ -62,7 +63,7 @@ def precondition(chain, stiff, c, d, g, matrix):
 
 @stub
 def correct(chain, matrix, r):
-    """Solve with the factors of `precondition`, r (columns, n) in place."""
+    """Solve the system of `precondition`, by its factors, for the right side r (columns, n), in place."""
 
 
 @stub
@@ -77,53 +78,54 @@ def vanishing(chain):
 
 @stub
 def lost(chain, work, slope):
-    """A disc whose heading vanishes on the straight line from `slope` (2, n) to the slopes of the base, or -1. Afterwards `slope`
-    holds the slopes of the base."""
+    """A disc whose heading vanishes on the straight line from `slope` (2, n) to the slopes of the base position, or -1. On return
+    `slope` holds the slopes of the base position.
+    """
 
 
-# Several configurations at once, the stages of a step: `moves` and `v` (stages, rows, n), `p` and `g` (stages, columns, n). Discs
-# take one after the other, `discs.kernels.shared`; the functions of a field all at once, `continuum.kernels.spectral`.
+# Several configurations, the stages of a step: `moves` and `v` (stages, rows, n), `p` and `g` (stages, columns, n). For discs they
+# are computed one after the other (`discs.kernels.shared`), for fields all at once (`continuum.kernels.spectral`).
 
 
 @stub
 def bases(chain, work, moves, c):
-    """c = C after each of `moves` from the base."""
+    """c = C after each of `moves` from the base position."""
 
 
 @stub
 def forwards(chain, work, c, p, v):
-    """v = C p of each."""
+    """v = C p at each stage."""
 
 
 @stub
 def forces(chain, work, state, t, moves, c, p, g):
-    """g = C^T (grad V - f) after each of `moves`, as `pullback` has it; t (stages,)."""
+    """g = C^T (grad V - f) after each of `moves`, as in `pullback`; t (stages,)."""
 
 
-# What collocation asks of a chain; `room` is its `Room`, `method` its parameters: `discs.integrators.collocation`
+# Functions of a chain for collocation; `room` is the `Room`, `method` the parameters of `discs.integrators.collocation`
 
 
 @stub
 def stages(chain, method, rows, columns):
-    """Room for c of the stages, as `bases` fills it, and for what `begin`, `solve` and `moved` share."""
+    """Workspace: c of the stages, for `bases`, and the arrays that `begin`, `solve` and `moved` share."""
 
 
 @stub
 def begin(chain, work, method, room, before, h):
-    """v = a first guess of the stages' rates, their momenta being those of `before`; prepares the matrices of `solve`."""
+    """v = a first guess of the rates of the stages, for the momenta of `before`. Also prepares the matrices of `solve`."""
 
 
 @stub
 def solve(chain, method, room, h):
-    """change = the solution for `rest` of the stages' momenta, with a C that does not change from sweep to sweep."""
+    """room.force = the change of the momenta of the stages: the solution for room.rest, with the same C in all sweeps."""
 
 
 @stub
 def moved(chain, method, room, sweep, h):
-    """How far a sweep, `sweep` after the first, moved the stages, in units of the chain's scale; p and v may be bettered."""
+    """The largest move of the stages by a sweep, number `sweep` from 0, in units of the scale. May improve p and v."""
 
 
-# What the driver asks of a method
+# Functions of a method, for the driver
 
 
 @stub
@@ -133,9 +135,10 @@ def room(method, chain, state):
 
 @stub
 def step(method, chain, work, room, before, after, t, h):
-    """A step from `before` (at first the base position, not changed) at the time t to `after` (at last the base position).
+    """A step from `before` at the time t to `after`, a time h later; returns its `Cost`.
 
-    Returns its `Cost`."""
+    On entry `before` is the base position; it is not changed. On return `after` is the base position.
+    """
 
 
 @stub
@@ -148,12 +151,12 @@ def jumps(method):
 
 @stub
 def like(state):
-    """Arrays for another state."""
+    """A new state with arrays of the same shapes, not filled."""
 
 
 @stub
 def take(state, to):
-    """to = state."""
+    """Copy a state to `to`."""
 
 
 @stub
@@ -168,9 +171,10 @@ def rate(state, chain, work, c, tau, move):
 
 @stub
 def kick(before, after, chain, work, t, h, c, g, defect):
-    """defect = 12 times the defect of a step h from the time t by the change of the force; see `discs.running.step_error`.
+    """defect = 12 times the defect of a step h from the time t, from the change of the force; see `discs.running.step_error`.
 
-    `after` is the base position; c and g are workspace like C and C^T grad V."""
+    `after` is the base position; c and g are workspace like C and C^T grad V.
+    """
 
 
 # A law of rolling, `chain.rolling`; `vanishing` too
@@ -222,4 +226,4 @@ def push(load, state, t, move, c, p, factor, g):
 
 @stub
 def guide(load, c, d, g, roll, turn):
-    """Add the diagonal matrix d C^T D C + g C^T (stiffness) C to roll (n,) and, with own headings, to turn (n,)."""
+    """Add the diagonal matrix d C^T D C + g C^T (stiffness) C to roll (n,) and, for steered discs, to turn (n,)."""

@@ -1,6 +1,6 @@
-"""Functions of several chains and methods. Each row of C has one entry per disc, for the momentum `column(row)`.
+"""Functions shared by chains and methods. Each row of C has one entry per disc, for the momentum `column(row)`.
 
-c, v : (rows, n). p : (1, n), or (2, n) with own headings.
+c, v : (rows, n). p : (1, n), or (2, n) for steered discs.
 """
 
 import numpy as np
@@ -18,13 +18,13 @@ def column(row):
 
 @part
 def columns(rows):
-    """The number of momenta of a disc with so many rows."""
+    """The number of momenta of a disc with `rows` coordinates."""
     return column(rows - 1) + 1
 
 
 @part
 def copy(a, to):
-    """to = a, two-dimensional."""
+    """Copy a two-dimensional array a to `to`."""
     for row in range(a.shape[0]):
         for i in range(a.shape[1]):
             to[row, i] = a[row, i]
@@ -53,7 +53,7 @@ def back(c, g, p):
 
 @part(fastmath={"contract", "nnan", "nsz", "reassoc"})
 def largest(a):
-    """The largest entry of a (n,), which has no negative ones."""
+    """The largest entry of a (n,), whose entries are not negative."""
     m = 0.0
     for i in range(a.size):
         m = a[i] if a[i] > m else m
@@ -76,13 +76,13 @@ def renew(c, p, tau, move, scale, change):
 
 @part
 def unsettled(method, sweep, moved):
-    """Whether a step takes another sweep after so many, the last of which moved it by `moved`, in units of its scale."""
+    """Whether a step needs another sweep after `sweep` sweeps, of which the last moved it by `moved`, in units of its scale."""
     return sweep < method.sweeps and not moved <= method.tolerance
 
 
 @part
 def stuck(method, sweep):
-    """Whether a step ended on its limit of sweeps and did not want to."""
+    """Whether a step stopped at its limit of sweeps without reaching its tolerance."""
     return method.tolerance > 0 and sweep == method.sweeps
 
 
@@ -152,7 +152,7 @@ def _kick(before, after, chain, work, t, h, c, g, defect):
 
 @part
 def ahead(chain, work, state, h, c, half, slope):
-    """A disc whose heading vanishes if discs move with their velocities at a state, the base position, for a time h; or -1.
+    """A disc whose heading vanishes if the discs keep their velocities at a state, the base position, for a time h; or -1.
 
     `slope` is that of the state; c and half are workspace like positions.
     """

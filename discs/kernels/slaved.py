@@ -42,7 +42,7 @@ def parameters(
     return Slaved(np.array(given.radius), weights, scale, shift, given.k, ends, rolling, links, load)
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace. base : links of the base position. links, tension : those of a moved position. c : C. step : (3, n), for loads.
     rhs : (1, n)."""
 
@@ -60,7 +60,7 @@ def _workspace(chain):
     n = chain.radius.size
     matrix = Matrix(np.empty(n), np.empty(n), np.empty(n), np.empty(2), np.empty((2, n)), np.empty(9))
     base, links, tension = np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1))
-    return Work(base, links, tension, np.empty((3, n)), np.empty((3, n * do.loaded(chain.load))), np.empty((1, n)), matrix)
+    return Workspace(base, links, tension, np.empty((3, n)), np.empty((3, n * do.loaded(chain.load))), np.empty((1, n)), matrix)
 
 
 @fill(do.factors, Slaved, _nrt=True)

@@ -53,7 +53,7 @@ def parameters(
     return Steered(weights, paces, padded, scale, shift, given.k, ring, load)
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace.
 
     Of the base position: base (4, n + 1), differences of neighbours; angles (4, n + 1), cosine and sine of headings and of the mean
@@ -84,7 +84,7 @@ def _workspace(chain):
     matrix = Matrix(np.empty((3, n)), np.empty((4, n)), np.empty((2, 2, n)), np.empty(11))
     across, couple = np.zeros((2, n + 1)), np.zeros(n + 1)
     c, step, rhs = np.empty((4, n)), np.empty((4, n)), np.empty((2, n))
-    return Work(base, angles, strain, links, turned, along, tension, across, couple, c, step, rhs, matrix)
+    return Workspace(base, angles, strain, links, turned, along, tension, across, couple, c, step, rhs, matrix)
 
 
 @fill(do.factors, Steered, _nrt=True)
