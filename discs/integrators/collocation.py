@@ -146,7 +146,7 @@ def _stages(chain: Any, method: Collocation, rows: int, columns: int) -> Stages:
     return Stages(c, common, x, z, change, stiff, single, double)
 
 
-@fill(do.begin, object, forceinline=True)
+@fill(do.begin, object)
 def _begin(chain: Any, work: Any, method: Collocation, room: Room, before: Phase, h: float) -> None:
     rule, own, move = method.tableau, room.stages, room.moves[0]
     c, stiff = own.common, do.pick(chain, own.stiff, 0)
@@ -163,7 +163,7 @@ def _begin(chain: Any, work: Any, method: Collocation, room: Room, before: Phase
         forward(c, before.pi, room.v[i])
 
 
-@fill(do.solve, object, forceinline=True)
+@fill(do.solve, object)
 def _solve(chain: Any, method: Collocation, room: Room, h: float) -> None:
     rule, own, x, z = method.tableau, room.stages, room.stages.x, room.stages.z
     room.force[:] = 0.0
@@ -177,7 +177,7 @@ def _solve(chain: Any, method: Collocation, room: Room, h: float) -> None:
         spread(rule.pairs_out[j], z, room.force)
 
 
-@fill(do.moved, object, forceinline=True)
+@fill(do.moved, object)
 def _moved(chain: Any, method: Collocation, room: Room, sweep: int, h: float) -> float:
     furthest = 0.0
     for i in range(room.force.shape[0]):
@@ -193,7 +193,7 @@ def _room(method: Collocation, chain: Any, state: Phase) -> Room:
     return Room(np.empty(s), moves, v, p, force, rest, do.stages(chain, method, rows, columns))
 
 
-@fill(do.step, Collocation, forceinline=True)
+@fill(do.step, Collocation)
 @part
 def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     times, moves, v, p, force, rest, stages = room

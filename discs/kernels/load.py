@@ -1,7 +1,8 @@
-"""Compiled loads: none, and linear ones. The plain twins are in `discs.loads`."""
+"""Compiled loads that are linear, or none: one type, so that a load needs no kernels of its own. Plain twins: `discs.loads`."""
 
 from typing import NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
@@ -9,46 +10,26 @@ from discs.kernels.compiled import fill
 from discs.kernels.shared import column
 
 
-class Unloaded(NamedTuple):
-    """No loads. (For numba a NamedTuple must have a field.)"""
-
-    loads: int
-
-
-UNLOADED = Unloaded(0)
-
-
 class Linear(NamedTuple):
-    """f = constant - damping v - stiffness q, all (rows, n)."""
+    """f = constant - damping v - stiffness q, all (rows, n); without rows for none."""
 
     constant: NDArray
     damping: NDArray
     stiffness: NDArray
 
 
-@fill(do.loaded, Unloaded)
-def _unloaded(load):
-    return False
-
-
-@fill(do.push, Unloaded)
-def _no_push(load, state, t, move, c, p, factor, g):
-    pass
-
-
-@fill(do.guide, Unloaded)
-def _no_guide(load, c, d, g, roll, turn):
-    pass
+NONE = np.empty((0, 0))
+UNLOADED = Linear(NONE, NONE, NONE)
 
 
 @fill(do.loaded, Linear)
 def _loaded(load):
-    return True
+    return load.constant.size > 0
 
 
 @fill(do.push, Linear)
 def _push(load, state, t, move, c, p, factor, g):
-    for row in range(c.shape[0]):
+    for row in range(load.constant.shape[0]):
         a, rate, to = c[row], p[column(row)], g[column(row)]
         constant, damping, stiffness = load.constant[row], load.damping[row], load.stiffness[row]
         hi, lo, step = state.hi[row], state.lo[row], move[row]
@@ -59,7 +40,7 @@ def _push(load, state, t, move, c, p, factor, g):
 
 @fill(do.guide, Linear)
 def _guide(load, c, d, g, roll, turn):
-    for row in range(c.shape[0]):
+    for row in range(load.constant.shape[0]):
         a, damping, stiffness = c[row], load.damping[row], load.stiffness[row]
         to = turn if column(row) else roll
         for i in range(a.size):

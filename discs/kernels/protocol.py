@@ -216,7 +216,7 @@ def assemble(law, ends, before, d, c, one, g, matrix):
 
 @stub
 def loaded(load):
-    """Whether there are loads; if not, their code is not compiled."""
+    """Whether there are loads; if not, their arrays have no rows."""
 
 
 @stub

@@ -167,19 +167,19 @@ def ahead(chain, work, state, h, c, half, slope):
     return lost
 
 
-@fill(do.bases, object, forceinline=True)
+@fill(do.bases, object)
 def _bases(chain, work, moves, c):
     for i in range(moves.shape[0]):
         do.basis(chain, work, moves[i], c[i])
 
 
-@fill(do.forwards, object, forceinline=True)
+@fill(do.forwards, object)
 def _forwards(chain, work, c, p, v):
     for i in range(p.shape[0]):
         forward(c[i], p[i], v[i])
 
 
-@fill(do.forces, object, forceinline=True)
+@fill(do.forces, object)
 def _forces(chain, work, state, t, moves, c, p, g):
     for i in range(p.shape[0]):
         do.pullback(chain, work, state, t[i], moves[i], c[i], p[i], g[i])
