@@ -193,7 +193,7 @@ def _room(method: Collocation, chain: Any, state: Phase) -> Room:
     return Room(np.empty(s), moves, v, p, force, rest, do.stages(chain, method, rows, columns))
 
 
-@fill(do.step, Collocation)
+@fill(do.step, Collocation, forceinline=True)
 @part
 def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     times, moves, v, p, force, rest, stages = room

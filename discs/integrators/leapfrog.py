@@ -123,7 +123,7 @@ def _room(method: Central, chain: Parameters, state: TwoStep) -> Room:
     return Room(np.empty_like(q), np.zeros_like(q), np.empty_like(q), np.empty((columns(q.shape[0]), q.shape[1])))
 
 
-@fill(do.step, Central)
+@fill(do.step, Central, forceinline=True)
 def _step(method: Central, chain: Parameters, work: Any, room: Room, before: TwoStep, after: TwoStep, t: float, h: float) -> Cost:
     c, still, g, p = room
     advance(before, before.next, 1.0, after)

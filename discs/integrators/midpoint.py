@@ -115,7 +115,7 @@ def _room(method: Composed, chain: Any, state: Phase) -> Room:
     return Room(np.empty_like(state.pi), np.empty_like(state.hi), np.zeros_like(state.hi), np.empty(state.hi.shape[1]))
 
 
-@fill(do.step, Composed)
+@fill(do.step, Composed, forceinline=True)
 def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     p, move, now, time = room.p, room.move, before, t
     solves, unconverged = 0, 0

@@ -120,7 +120,7 @@ def _room(method: Swept, chain: Any, state: Phase) -> Room:
     )
 
 
-@fill(do.step, Swept)
+@fill(do.step, Swept, forceinline=True)
 def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     c, end, still, half, move, v, g, pull, share, ones, change = room
     do.basis(chain, work, still, c)

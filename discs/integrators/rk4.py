@@ -72,7 +72,7 @@ def _room(method: Explicit, chain: Parameters, state: Phase) -> Room:
     return Room(c, move, v, total, np.empty_like(state.pi), np.empty_like(state.pi), np.empty_like(state.pi))
 
 
-@fill(do.step, Explicit)
+@fill(do.step, Explicit, forceinline=True)
 def _step(method: Explicit, chain: Parameters, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
     c, move, v, total, g, kick, p = room
     nodes, weights, pi = method.nodes, method.weights, before.pi

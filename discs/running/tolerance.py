@@ -13,10 +13,11 @@ Input: a problem, tolerances and frames. Output: a run within the tolerances, wi
    MOST_ORDER.
 4. If the estimate is within every tolerance, stop. Otherwise go to 2 with more steps, by a factor within GROWTH, such that C h^p is
    the tolerance over AIM.
-5. The error has stalled if p is at most LEAST_ORDER. After two stalls in a row "auto" takes a method of higher order. If there is
-   none, a stalled run is repeated with initial positions changed by one unit in the last place. If the two differ by a tenth of the
-   error or more, rounding is the limit, and `NotReached` is raised. For tolerances below FINE this test is made as soon as errors
-   are below RESOLVED; if the difference exceeds the tolerance, no step can reach it.
+5. The error has stalled if p is at most LEAST_ORDER, or if it does not fall below those before. After two stalls in a row "auto"
+   takes a method of higher order. If there is none, a stalled run is repeated with initial positions moved by one unit in the last
+   place. If they differ by a tenth of the error or more, or if sweeps that converged to rounding may leave as much, rounding is
+   the limit, and `NotReached` is raised. For tolerances below FINE this test is made as soon as errors are below RESOLVED; if the
+   difference exceeds the tolerance, no step can reach it.
 6. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
    ends there, provided that its |r'| one step before is below ENDED and that two runs in a row lose it at the same time.
 
@@ -51,7 +52,7 @@ AIM = 1.3  # the next run aims at the tolerance over this
 RESOLVED = 1e-2  # relative error below which the effect of rounding is tested
 FINE = 1e-6  # tolerance below which the effect of rounding is tested early
 ENDED = 0.01  # |r'| of a disc one step before it loses its heading; if it is larger, the step is too long
-ATTEMPTS, FAILURES = 24, 12  # runs at most, and failures among them
+ATTEMPTS, FAILURES = 28, 16  # runs at most, and failures among them
 
 WANTED = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y"), "contact_force": ("contact_force",)}
 LADDER = Midpoint(), Gauss6(), Gauss8()  # the methods of "auto", in this order
@@ -116,7 +117,7 @@ def to_tolerance(
     runs: list[Solution] = []  # of one method, at most three, with shorter and shorter steps
     size: dict[str, float] = {}
     failure: SimulationError | None = None
-    looked, stalls, failures = False, 0, 0
+    looked, stalls, failures, best_yet = False, 0, 0, np.inf
     for attempt in range(1, ATTEMPTS + 1):
         dt = end / steps
         sharp = _sharpened(integrator, isinstance(method, str), estimates.sweeps_to(problem, bound, size, dt, end))
@@ -145,22 +146,25 @@ def to_tolerance(
             longer, shorter = (run(problem, settings, h, times) for settings, h in pair)
             errors = estimates.errors(longer, shorter, order)
             worst = _worst(errors, bound, estimates.sizes(shorter, bound))
-        swept = dict.fromkeys(bound, 0.0) | estimates.unswept(longer)
-        limit = "fewest steps" if first else "sweeps" if _worst(swept, bound, size) > worst / 2 else "tolerance"
+        left = _worst(estimates.unswept(longer), bound, size)
+        limit = "fewest steps" if first else "sweeps" if left > worst / 2 else "tolerance"
         best = _told(longer, errors, tol, attempt, limit)
         if worst <= 1:
             return best
         seen = 1.0 if first else order[max(bound, key=lambda name: errors[name] / bound[name] / size[name])]
-        stalls = stalls + 1 if not first and seen <= LEAST_ORDER else 0
+        stalls = stalls + 1 if not first and (seen <= LEAST_ORDER or worst >= best_yet) else 0
+        best_yet = min(best_yet, worst)
         resolved = min(bound.values()) < FINE and not looked and max(errors[name] / size[name] for name in bound) < RESOLVED
         if resolved or (stalls and not higher):
             looked = True
             floor = _worst(estimates.differences(found, run(estimates.nudged(problem), sharp, dt, found.t)), bound, size)
+            if sharp.sweep_tolerance <= estimates.LEAST_SWEPT:
+                floor = max(floor, _worst(estimates.unswept(found), bound, size))  # sweeps that converged to rounding
             if floor > (1 if resolved else worst / 10):
                 raise NotReached(min(bound.values()), worst, best.stats["dt"], floor, best)
         if stalls >= 2 and higher:
             integrator, *higher = higher
-            steps, runs, stalls = max(FEWEST, steps // 4), [], 0
+            steps, runs, stalls, best_yet = max(FEWEST, steps // 4), [], 0, np.inf
             continue
         least, most = GROWTH
         wanted = longer.stats["steps"] * (AIM * worst) ** (1 / (integrator.order if first else max(seen, 1.0)))
@@ -188,7 +192,7 @@ class NotReached(SimulationError):
         if floor is None:
             why = f"and {ATTEMPTS} runs with smaller and smaller steps were made; take a larger tol or another method"
         else:
-            why = f"and runs that start one unit in the last place apart differ by {tol * floor:.1e}, so rounding is the limit; "
+            why = f"and rounding of positions and sweeps changes a run by {tol * floor:.1e}, so rounding is the limit; "
             why += "take a larger tol, or end the run earlier"
         super().__init__(f"{what}, {why}", best.stats["steps"], best.t[-1], 0)
         self.best, self._given = best, (tol, worst, dt, floor, best)
@@ -203,8 +207,8 @@ def _sharpened(integrator: Integrator, free: bool, tolerance: float) -> Integrat
 
 
 def _worst(errors: Mapping[str, float], bound: Mapping[str, float], size: Mapping[str, float]) -> float:
-    """The largest error in units of its tolerance."""
-    return max(errors[name] / (tol * size[name]) for name, tol in bound.items())
+    """The largest error in units of its tolerance; quantities without one count as exact."""
+    return max(errors.get(name, 0.0) / (tol * size[name]) for name, tol in bound.items())
 
 
 def _told(run: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int, limit: str) -> Solution:

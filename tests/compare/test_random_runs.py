@@ -8,7 +8,8 @@ from compare import random_runs as module
 from compare.__main__ import main
 from compare.random_runs import SIZES, Runs, examine, random_problem
 from compare.trust_table import LEAST, MOST, Row
-from discs import SimulationError
+from discs import SimulationError, simulate
+from discs.running.tolerance import NotReached
 
 SAMPLE = (0, 3)  # both laws; chosen for their time only
 
@@ -33,6 +34,14 @@ def test_tolerances_are_kept(index):
     assert row.outcome == "within", row
     assert row.reference_error <= row.tol / LEAST
     assert not row.counts or 1 <= row.ratio <= MOST, row
+
+
+def test_a_tolerance_below_the_rounding_of_sweeps_is_refused_at_once():
+    """Few discs hardly see a narrow bump: theta is so small that rounding exceeds its tolerance."""
+    problem, tol, _ = random_problem(7, 491)
+    with pytest.raises(NotReached, match="so rounding is the limit") as caught:
+        simulate(problem, "auto", tol=tol, frames=3, progress=False)
+    assert caught.value.best.stats["steps"] < 5000
 
 
 def test_wrong_runs_and_refusals_are_told(monkeypatch):
