@@ -49,6 +49,7 @@ class Formula:
     call : the function of q (m,).
     shape : of its values; () is a number.
     size : m.
+    arguments : what messages call q; for a function of t and q that is given as one of the vector (t, q), "t, q".
 
     Attributes
     ----------
@@ -56,8 +57,8 @@ class Formula:
     error : estimated error of its last derivatives, relative to their largest entry; 0 for the complex step.
     """
 
-    def __init__(self, name: str, call: Callable[[Float], Any], shape: tuple[int, ...], size: int) -> None:
-        self.name, self.shape, self.size = name, shape, size
+    def __init__(self, name: str, call: Callable[[Float], Any], shape: tuple[int, ...], size: int, arguments: str = "q") -> None:
+        self.name, self.shape, self.size, self.arguments = name, shape, size, arguments
         self.how, self.error = "complex step", 0.0
         self._call = call
         self._steps: Float | None = None  # (m,), of real differences
@@ -72,7 +73,7 @@ class Formula:
         value = self._array(given, None)
         kind = value.dtype.kind
         if kind not in "fiuO" or (kind == "f" and value.dtype.itemsize < 8):
-            raise ValueError(f"{self.name}(q) must be real numbers in double precision; got {value.dtype}")
+            raise ValueError(f"{self.name}({self.arguments}) must be real numbers in double precision; got {value.dtype}")
         return self._array(value, float)
 
     def along(self, q: Float, v: Float) -> Float:
@@ -80,7 +81,7 @@ class Formula:
         steps = self._ready(q)
         with np.errstate(all="ignore"):
             reach = float(np.max(np.abs(v) / steps))
-        if reach == 0:
+        if reach < 1e-300:  # 1/reach would overflow
             return np.zeros(self.shape)
         return self._derivatives(q, v[:, None], np.array([1 / reach]), v)[..., 0]
 
@@ -145,7 +146,7 @@ class Formula:
     def _ready(self, q: Float) -> Float:
         if self._steps is None:
             if not np.isfinite(self(q)).all():
-                raise ValueError(f"{self.name} is not finite at q = {q}")
+                raise ValueError(f"{self.name} is not finite at {self.arguments} = {q}")
             self._refuse_single(q)
             self._examine(q)
         assert self._steps is not None
@@ -164,7 +165,8 @@ class Formula:
                 single &= value.astype(np.float32) == value
         if changed.any() and single[changed].all():
             raise ValueError(
-                f"{self.name}(q) is computed in single precision, with 7 digits, too few for its derivatives; use float64"
+                f"{self.name}({self.arguments}) is computed in single precision, with 7 digits, too few for its derivatives; "
+                "use float64"
             )
 
     def _examine(self, q: Float) -> Float:
@@ -204,7 +206,7 @@ class Formula:
                     break
             step *= 10
         if best is None:
-            raise ValueError(f"{self.name} is not finite near q = {q}: it has no derivative there")
+            raise ValueError(f"{self.name} is not finite near {self.arguments} = {q}: it has no derivative there")
         return best
 
     def _difference(self, q: Float, d: Float, scale: float) -> tuple[Float, float]:
@@ -239,12 +241,12 @@ class Formula:
         except (TypeError, ValueError):
             if dtype is complex:
                 raise
-            raise ValueError(f"{self.name}(q) must be numbers of shape {self.shape}; got {given!r}") from None
+            raise ValueError(f"{self.name}({self.arguments}) must be numbers of shape {self.shape}; got {given!r}") from None
         wanted = int(np.prod(self.shape))
         if value.shape != self.shape and value.size == wanted and (wanted <= 1 or value.ndim < 2):
             return value.reshape(self.shape)
         if value.shape != self.shape:
-            raise ShapeError(self.name, self.shape, value.shape)
+            raise ShapeError(f"{self.name}({self.arguments})", self.shape, value.shape)
         return value
 
 
@@ -252,7 +254,7 @@ class ShapeError(ValueError):
     """A formula's value of a wrong shape."""
 
     def __init__(self, name: str, wanted: tuple[int, ...], given: tuple[int, ...]) -> None:
-        super().__init__(f"{name}(q) must be of shape {wanted}; got {given}")
+        super().__init__(f"{name} must be of shape {wanted}; got {given}")
         self.given = given
 
 

@@ -11,7 +11,8 @@ from discs import checks
 from discs.arrays import Float
 from discs.mechanics import MechanicalSystem, Trajectory
 
-FRAMES = ("t", "q", "v", "multipliers", "energy", "residual")  # of a Trajectory
+WORKS = ("work", "reaction_work")
+FRAMES = ("t", "q", "v", "multipliers", "energy", "residual", *WORKS)  # of a Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +62,16 @@ def _moment(t: Float) -> float:
 
 
 def _frames(path: Trajectory, part: slice) -> Trajectory:
-    return replace(path, **{name: getattr(path, name)[part] for name in FRAMES})
+    return replace(path, **{name: value[part] for name in FRAMES if (value := getattr(path, name)) is not None})
 
 
 def _joined(parts: list[Trajectory]) -> Trajectory:
     last = parts[-1]
     stats = last.stats | {n: sum(p.stats[n] for p in parts) for n in ("steps", "evaluations")}
     stats["rank_drops"] = sorted(moment for p in parts for moment in p.stats["rank_drops"])
-    return replace(last, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in FRAMES}, stats=stats)
+    rows = {name: np.concatenate([getattr(p, name) for p in parts]) for name in FRAMES if getattr(last, name) is not None}
+    rows |= {name: rows[name] - rows[name][0] for name in WORKS if name in rows}
+    return replace(last, **rows, stats=stats)
 
 
 def nonzero(name: str, value: float, why: str) -> float:

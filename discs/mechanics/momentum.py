@@ -3,10 +3,10 @@ r"""Symmetry and momentum: Noether's theorem under the rolling constraint.
 Let xi_Q(q) = X(q) xi, with xi in a vector space g, be the velocities of a group that leaves L invariant: motions of the plane, and
 an equal roll of all discs that torsion springs join. For any xi, constant or not, p = M v satisfies
 
-    d/dt <p, xi_Q> = <A^T lambda, xi_Q> + <p, (d xi/dt)_Q>,
+    d/dt <p, xi_Q> = <A^T lambda + Q, xi_Q> + <p, (d xi/dt)_Q>,
 
-because L is invariant along xi_Q and the only other force is the ground's. For constant xi this is the balance of
-momentum, of moment of momentum and of spin with the ground's forces (`symmetry_momenta`).
+because L is invariant along xi_Q and the only other forces are the ground's and applied forces Q, if there are any (Q = 0 below).
+For constant xi this is the balance of momentum, of moment of momentum and of spin (`symmetry_momenta`).
 
 The ground does no work along directions that obey the constraints, A xi_Q = 0. The symmetries among them form the kernel g^q of
 A(q) X(q). For a section xi(q) in g^q, the *nonholonomic momentum map* J = <p, xi_Q> obeys the *momentum equation*, which does not
@@ -78,10 +78,11 @@ def symmetry_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v: Ar
     """
     t, path = _motion(system, t, q, v)
     value, rate = [], []
-    for q_now, v_now in path:
+    for time, (q_now, v_now) in zip(t, path, strict=True):
         x = _generators(system, q_now)
+        reaction = system.constraint(q_now).T @ system.accelerations(q_now, v_now, t=time).multipliers
         value.append(x.T @ system.momentum(q_now, v_now))
-        rate.append(x.T @ (system.constraint(q_now).T @ system.accelerations(q_now, v_now).multipliers))
+        rate.append(x.T @ (reaction + _applied(system, time, q_now, v_now)))
     size = len(value[0])
     return Momenta(t, np.array(value), np.array(rate), np.broadcast_to(np.eye(size), (len(t), size, size)))
 
@@ -116,7 +117,7 @@ def nonholonomic_momenta(system: MechanicalSystem, t: ArrayLike, q: ArrayLike, v
         p = system.momentum(q_now, v_now)
         section.append(start @ projector)
         value.append(section[-1] @ (x.T @ p))
-        rate.append(start @ -(half + half.T) @ (x.T @ p))
+        rate.append(start @ -(half + half.T) @ (x.T @ p) + section[-1] @ (x.T @ _applied(system, time, q_now, v_now)))
     return Momenta(t, np.array(value), np.array(rate), np.array(section))
 
 
@@ -135,6 +136,11 @@ def _rank(system: MechanicalSystem, q: Float, n: Float, x: Float) -> int:
     columns = np.linalg.norm(x / np.where(unit > 0, unit, 1.0)[:, None], axis=0)
     scaled = n / np.where(rows > 0, rows, 1.0)[:, None] / np.where(columns > 0, columns, 1.0)
     return int((np.linalg.svd(scaled, compute_uv=False) > RANK).sum())
+
+
+def _applied(system: MechanicalSystem, t: float, q: Float, v: Float) -> Float:
+    """Q, the forces beside those of L, (m,)."""
+    return np.zeros(len(q)) if system.applied is None else np.asarray(system.applied(t, q, v))
 
 
 def _generators_rate(system: MechanicalSystem, q: Float, v: Float) -> Float:

@@ -51,7 +51,7 @@ class RankDrops:
     def __init__(self, system: Equations, sizes: Sizes, drift: Drift) -> None:
         self.system, self.sizes, self.drift, self.m = system, sizes, drift, sizes.m
         self.norms = np.zeros(len(system.owners))
-        self.watched = 0 < len(system.owners) * len(system.names) <= LARGEST
+        self.watched = system.phi is None and 0 < len(system.owners) * len(system.names) <= LARGEST
         self.sigma, self.largest, self.owners, self.held = np.inf, 0.0, "", True
         self.tried = np.inf
         self.rows: Float | None = None  # A of the last state, scaled
@@ -92,7 +92,7 @@ class RankDrops:
         if tau > 0.3 * self.tried:
             return None
         self.tried = tau
-        y = self.drift.corrected(solver.y)
+        y = self.drift.corrected(solver.y, solver.t)
         t, length = solver.t, direction * tau / 0.475  # nodes of DOP853 are 1/3 and 0.6, the moment is between
         once, between = _steps(rate, y, (t, t + length))
         twice, _ = _steps(rate, y, (t, t + 0.05 * length, t + length))

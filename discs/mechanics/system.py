@@ -1,9 +1,8 @@
 """Mechanical systems: built from formulas or parts, extended by constraints, integrated in time."""
 
-import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
@@ -14,12 +13,15 @@ from discs.arrays import Float
 from discs.mechanics import motion, saddle
 from discs.mechanics.derivatives import Formula, ShapeError
 from discs.mechanics.equations import Equations, names_of
-from discs.mechanics.motion import Trajectory
+from discs.mechanics.inputs import Given, function_of
+from discs.mechanics.trajectory import Trajectory
+
+Drive: TypeAlias = ArrayLike | Callable[[float, Float], ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
 class MechanicalSystem(Equations):
-    """A mechanical system with linear velocity constraints; m coordinates, c constraints.
+    """A mechanical system with velocity constraints; m coordinates, c constraints.
 
     Make one with `discs.mechanics.lagrange.lagrange_dalembert` from discs, with `from_lagrangian` from formulas, or from its parts,
     the attributes of `discs.mechanics.equations.Equations`.
@@ -33,8 +35,9 @@ class MechanicalSystem(Equations):
         potential: Callable[[Float], Any],
         constraint: Callable[[Float], ArrayLike],
         owners: Sequence[str],
-        drive: ArrayLike = 0.0,
+        drive: Drive = 0.0,
         symmetry: Callable[[Float], ArrayLike] | None = None,
+        force: Callable[[float, Float, Float], ArrayLike] | None = None,
     ) -> "MechanicalSystem":
         """A system from M (or M(q)), V(q) and A(q), formulas that take q (m,) and return numbers.
 
@@ -49,7 +52,9 @@ class MechanicalSystem(Equations):
         potential : q -> V.
         constraint : q -> A (c, m); c may be 0, with no owners.
         owners : c names, the owner of each row.
-        drive, symmetry : as the attributes.
+        drive : b of A v = b: c numbers, or a function t, q -> b (c,), smooth in t and q.
+        symmetry : as the attribute.
+        force : t, q, v -> Q (m,), generalised forces beside those of L, as of dampers and actuators; the attribute `applied`.
 
         Raises
         ------
@@ -57,8 +62,9 @@ class MechanicalSystem(Equations):
         """
         names, owners = names_of("names", names), names_of("owners", owners)
         m, c = len(names), len(owners)
-        rows, height = Formula("A", _of_q("A", constraint), (c, m), m), Formula("V", _of_q("V", potential), (), m)
-        inertia = Formula("M", _of_q("M", mass) if callable(mass) else lambda q: mass, (m, m), m)
+        rows = Formula("A", function_of("q", "A", constraint), (c, m), m)
+        height = Formula("V", function_of("q", "V", potential), (), m)
+        inertia = Formula("M", function_of("q", "M", mass) if callable(mass) else lambda q: mass, (m, m), m)
         given = tuple(_shape_of(formula) for formula in (rows, inertia))
         if given != ((c, m), (m, m)):
             raise ValueError(
@@ -68,7 +74,7 @@ class MechanicalSystem(Equations):
         if constant is not None:
             saddle.symmetric(constant, names)
 
-        def force(q: Float, v: Float) -> Float:
+        def of_l(q: Float, v: Float) -> Float:
             f = -height.slopes(q)
             if constant is None:
                 slopes = inertia.slopes(q)  # dM_ij/dq_k
@@ -80,21 +86,26 @@ class MechanicalSystem(Equations):
             owners,
             inertia if constant is None else lambda q: constant,
             lambda q: float(height(q)),
-            force,
+            of_l,
             rows,
             rows.along,
-            np.asarray(drive),
+            drive if callable(drive) else np.asarray(drive),
             None if symmetry is None else lambda q: np.asarray(symmetry(q), dtype=float),
             (height, rows) if constant is not None else (height, rows, inertia),
+            force,
         )
 
-    def also(self, rows: ArrayLike, owners: Sequence[str], drive: ArrayLike = 0.0) -> "MechanicalSystem":
-        """The system with more constraints, constant rows (k, m) with rows @ v = drive: a disc that is held, a motor."""
+    def also(self, rows: ArrayLike, owners: Sequence[str], drive: Drive = 0.0) -> "MechanicalSystem":
+        """The system with more constraints, constant rows (k, m) with rows @ v = drive: a disc that is held, a motor.
+
+        drive : k numbers, or a function t, q -> k numbers.
+        """
         owners = names_of("owners", owners)
         extra = scipy.sparse.csr_array(np.atleast_2d(np.asarray(rows, dtype=float)))
         if extra.shape != (len(owners), len(self.names)):
             raise ValueError(f"rows must have shape ({len(owners)}, {len(self.names)}), one row per owner; got {extra.shape}")
         none = scipy.sparse.csr_array(extra.shape)
+        drive = drive if callable(drive) else checks.field("drive", drive, len(owners))
         return replace(
             self,
             owners=(*self.owners, *owners),
@@ -102,7 +113,7 @@ class MechanicalSystem(Equations):
             constraint_rate=lambda q, v: scipy.sparse.vstack(
                 [scipy.sparse.csr_array(self.constraint_rate(q, v)), none], format="csr"
             ),
-            drive=np.concatenate([self.drive, checks.field("drive", drive, len(owners))]),
+            drive=_joined(self.drive, drive),
         )
 
     def integrate(
@@ -115,6 +126,7 @@ class MechanicalSystem(Equations):
         *,
         method: str = "auto",
         atol: ArrayLike | None = None,
+        max_step: float | None = None,
         progress: bool = True,
     ) -> Trajectory:
         """The motion from q, v at times[0], integrated by SciPy's methods; for small systems.
@@ -133,35 +145,32 @@ class MechanicalSystem(Equations):
             Radau from where the problem is stiff. `Trajectory.stats` names the one used.
         atol : tolerance of a step's error, absolute: a number or one per entry of (q, v) or (q, v, mu). By default 1e-3 rtol of
             the size of each quantity.
+        max_step : longest step. By default a hundredth of the time span if forces or drives depend on t; a signal that is much
+            shorter than max_step may be stepped over.
         progress : show a bar after a second.
 
         Raises
         ------
         ValueError : if v does not obey the constraints, naming the worst owner, V is not finite, M not symmetric or not positive,
-            and for arrays of a wrong shape.
+            and for arrays of a wrong shape; if forces or drives are not finite numbers of the right shape, with t.
         RuntimeError : if the motion cannot be continued, with the time and the cause.
 
         Warns
         -----
-        UserWarning : if energy that is conserved (without drive), or a constraint, is off by over 1 %; if the formulas' precision
-            is too low for rtol.
+        UserWarning : if energy - work - reaction_work, which is constant, or a constraint, is off by over 1 %; if the formulas'
+            precision is too low for rtol.
         """
         q, v = self._vectors(q, v)
         charges = None if mu is None else checks.vector("mu", mu, len(self.owners))
-        return motion.integrate(self, q, v, charges, times, method, rtol, atol, progress)
+        return motion.integrate(self, q, v, charges, times, method, rtol, atol, progress, max_step)
 
 
-def _of_q(name: str, formula: Callable[[Float], Any]) -> Callable[[Float], Any]:
-    """`formula`, which must take q alone."""
-    if not callable(formula):
-        raise ValueError(f"{name} must be a function of q; got {formula!r}")
-    try:
-        inspect.signature(formula).bind(None)
-    except TypeError as error:
-        raise ValueError(f"{name} must be a function of q alone, {name}(q); {error}") from None
-    except ValueError:  # a builtin without a signature
-        pass
-    return formula
+def _joined(one: Any, other: Any) -> Any:
+    """Both drives, arrays or functions, one after the other."""
+    if not callable(one) and not callable(other):
+        return np.concatenate([one, other])
+    calls = [d.call if isinstance(d, Given) else d if callable(d) else lambda t, q, d=d: d for d in (one, other)]
+    return lambda t, q: np.concatenate([np.atleast_1d(call(t, q)) for call in calls])
 
 
 def _shape_of(formula: Formula) -> tuple[int, ...]:

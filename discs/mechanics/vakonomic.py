@@ -14,9 +14,9 @@ d/dt (M q. + A^T mu) = -grad V + d/dq (mu.A q.) are
     M q.. = -grad V - A^T mu. + G(q, q.) mu,   (G mu)_j = sum_{a,k} mu_a (dA_ak/dq_j - dA_aj/dq_k) q._k,
 
 that is G mu = -sum_a mu_a i_q. dA^a. So a vakonomic system is the nonholonomic one (lambda = -mu.) in magnetic fields dA^a, with
-charges mu_a that obey mu. = -lambda. The two agree where G mu does no work on admissible displacements:
-always if the constraint is integrable (dA^a = 0), seldom if it is not. The field does no work on the motion itself,
-q. . G mu = 0, so both conserve the energy.
+charges mu_a that obey mu. = -lambda. The two agree where G mu does no work on admissible displacements: always if the constraint is
+integrable (dA^a = 0), seldom if it is not. The field does no work on the motion itself, q. . G mu = 0, so both conserve the energy.
+(A q. = b(t, q) adds -mu.b to the action, and the force -b_q^T mu.)
 
 Initial data: q(0), admissible q.(0), and, for the vakonomic motion only, mu(0), c numbers that no law of mechanics determines. With
 mu(0) = 0, or any that `agreeing_multipliers` spans, the initial accelerations agree.

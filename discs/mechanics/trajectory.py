@@ -1,0 +1,55 @@
+"""The motion of a mechanical system at given times."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from discs.arrays import Float
+from discs.mechanics.equations import Equations
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,).
+
+    mu : (F, c), the charges of a vakonomic motion, see `discs.mechanics.vakonomic`; None if it is nonholonomic.
+    stats : "method", "rtol" as used, "steps", "evaluations" (of accelerations), "rank_drops" (times at which constraints were
+        dependent), and "derivatives": of each formula how they were taken and their largest relative error at the frames.
+    work, reaction_work : (F,), work since t[0] of the applied forces and of the reaction of constraints (of drives), with
+        energy - energy[0] = work + reaction_work up to the tolerance; None if neither can do work.
+
+    Multipliers are nan at a moment when rows of A are dependent: they are not determined then.
+    """
+
+    t: Float
+    q: Float
+    v: Float
+    multipliers: Float
+    energy: Float
+    residual: Float
+    mu: Float | None = None
+    stats: dict[str, Any] = field(default_factory=dict)
+    work: Float | None = None
+    reaction_work: Float | None = None
+
+
+def at_frames(system: Equations, t: Float, found: Float, charged: bool, stats: dict[str, Any]) -> Trajectory:
+    """The trajectory of the states `found` (F, 2m + charges + works), see `discs.mechanics.motion.Rate`, at times t (F,)."""
+    m, c = len(system.names), len(system.owners)
+    path, speed, charges, works = np.split(found, np.cumsum([m, m, c * charged]), axis=1)
+    multipliers = np.full((t.size, c), np.nan)
+    errors = dict.fromkeys((f.name for f in system.derived), 0.0)
+    for frame, (q, v, mu) in enumerate(zip(path, speed, charges, strict=True)):
+        try:
+            multipliers[frame] = system.accelerations(q, v, mu if charged else None, t[frame]).multipliers
+        except ValueError:
+            if not stats["rank_drops"]:
+                raise
+        errors = {f.name: max(errors[f.name], f.error) for f in system.derived}
+    stats["derivatives"] = {f.name: {"how": f.how, "error": errors[f.name]} for f in system.derived}
+    states = list(zip(path, speed, strict=True))
+    energy = np.array([system.energy(q, v) for q, v in states])
+    off = [np.abs(system.residual(q, v, time)).max(initial=0.0) for time, (q, v) in zip(t, states, strict=True)]
+    work, reaction = works.T if works.size else (None, None)
+    return Trajectory(t, path, speed, multipliers, energy, np.array(off), charges if charged else None, stats, work, reaction)

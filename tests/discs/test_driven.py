@@ -1,0 +1,372 @@
+"""Forces f(t, q, v) and drives b(t, q): motions against closed forms and second derivations, the balance of energy, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discs.mechanics import MechanicalSystem, driven, textbook
+from discs.mechanics.momentum import symmetry_momenta
+
+BALL = {"mass": 1.3, "radius": 0.7, "table_rate": 1.7, "place": (0.4, -0.3), "velocity": (0.2, 0.5), "spin": 0.6}
+HOMOGENEOUS = 0.4 * 1.3 * 0.7**2
+BOOKS = {
+    "ball on a turntable": driven.ball_on_turntable(inertia=HOMOGENEOUS, **BALL),
+    "shell on a turntable": driven.ball_on_turntable(inertia=2 / 3 * 1.3 * 0.7**2, **BALL),
+    "bead on a wire": driven.bead_on_wire(1.3, turn_rate=-0.8, r=0.4, speed=-0.5, heading=0.3),
+}
+TIMES = np.linspace(0, 4, 9)
+
+
+def balance(path):
+    return np.abs(path.energy - path.energy[0] - path.work - path.reaction_work).max()
+
+
+def one(force=None, drive=None, mass=1.0, stiffness=0.0):
+    """A particle on a line, or on a drive."""
+    rows, owner, b = ([[1]], "drive", drive) if drive else (np.zeros((0, 1)), (), 0.0)
+    return MechanicalSystem.from_lagrangian(
+        "x", [[mass]], lambda q: 0.5 * stiffness * q[0] ** 2, lambda q: rows, owner, b, force=force
+    )
+
+
+# Known answers
+
+
+@pytest.mark.parametrize("name", BOOKS)
+def test_closed_forms(name):
+    book = BOOKS[name]
+    path = book.integrate(np.linspace(-2, 4, 13), progress=False)
+    exact = [np.array(part) for part in zip(*(book.exact(t) for t in path.t), strict=True)]
+    for found, expected in zip((path.q, path.v, path.multipliers), exact, strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+    assert path.residual.max() < 1e-12
+    assert balance(path) < 1e-9 < np.ptp(path.energy)
+    assert np.abs(path.work).max() == 0  # a drive alone: all work is that of its reaction
+
+
+@pytest.mark.parametrize("name", BOOKS)
+def test_closed_forms_are_motions(name):
+    """Of the closed form alone: v = dq/dt, A v = b, and M v. = f + A^T lambda by differences."""
+    book, t, eps = BOOKS[name], 1.3, 1e-4
+    (before, v_before, _), (q, v, reaction), (after, v_after, _) = (book.exact(t + d) for d in (-eps, 0, eps))
+    np.testing.assert_allclose((after - before) / (2 * eps), v, atol=1e-7)
+    np.testing.assert_allclose(book.system.constraint(q) @ v, book.system.drive(t, q), atol=1e-14)
+    left = book.system.mass(q) @ (v_after - v_before) / (2 * eps)
+    np.testing.assert_allclose(left, book.system.force(q, v) + book.system.constraint(q).T @ reaction, atol=1e-6)
+
+
+def test_a_ball_on_a_turntable_moves_on_circles_at_two_sevenths_of_its_rate():
+    """Centre and radius from the initial data: r + J v/(k Omega), |v|/(k Omega)."""
+    rate = 2 / 7 * 1.7
+    times = np.linspace(0, 2 * np.pi / rate, 25)
+    path = BOOKS["ball on a turntable"].integrate(times, progress=False)
+    np.testing.assert_allclose(path.q[-1, :2], path.q[0, :2], atol=1e-9)
+    away = path.q[:, :2] - (np.array([0.4, -0.3]) + np.array([-0.5, 0.2]) / rate)
+    np.testing.assert_allclose(np.hypot(*away.T), np.hypot(0.2, 0.5) / rate, atol=1e-9)
+    np.testing.assert_allclose(np.unwrap(np.arctan2(*away.T[::-1])) - np.arctan2(*away[0, ::-1]), rate * times, atol=1e-9)
+
+
+def angular(q, v):
+    """The angular velocity in the frame at rest, of R = R_z(q_2) R_x(q_3) R_z(q_4)."""
+    phi, theta = q[2], q[3]
+    return (
+        v[3] * np.cos(phi) + v[4] * np.sin(phi) * np.sin(theta),
+        v[3] * np.sin(phi) - v[4] * np.cos(phi) * np.sin(theta),
+        v[2] + v[4] * np.cos(theta),
+    )
+
+
+def test_the_same_ball_by_its_three_angles():
+    """Euler's angles instead of quasi-coordinates: M and A depend on q."""
+    inertia, book = HOMOGENEOUS, BOOKS["ball on a turntable"]
+
+    def mass(q):
+        c = np.cos(q[3])
+        z = 0 * c
+        return [
+            [1.3 + z, z, z, z, z],
+            [z, 1.3 + z, z, z, z],
+            [z, z, inertia + z, z, inertia * c],
+            [z, z, z, inertia + z, z],
+            [z, z, inertia * c, z, inertia + z],
+        ]
+
+    def rows(q):
+        s, c, lean = np.sin(q[2]), np.cos(q[2]), np.sin(q[3])
+        return [[1, 0, 0, -0.7 * s, 0.7 * c * lean], [0, 1, 0, 0.7 * c, 0.7 * s * lean]]
+
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "phi", "theta", "psi"), mass, lambda q: 0.0, rows, ("ball", "ball"), lambda t, q: [-1.7 * q[1], 1.7 * q[0]]
+    )
+    q = np.array([0.4, -0.3, 0.2, 1.5, 0.0])
+    turn = np.array([[angular(q, v)[i] for v in np.eye(5)[2:]] for i in range(3)])
+    v = np.array([0.2, 0.5, *np.linalg.solve(turn, book.v[2:])])
+    path = system.integrate(q, v, [0.0, 0.5, 1.0], progress=False)
+    same = book.integrate([0.0, 0.5, 1.0], progress=False)
+    np.testing.assert_allclose(path.q[:, :2], same.q[:, :2], atol=1e-10)
+    np.testing.assert_allclose(path.multipliers, same.multipliers, atol=1e-9)
+    np.testing.assert_allclose([angular(*z) for z in zip(path.q, path.v, strict=True)], same.v[:, 2:], atol=1e-10)
+
+
+def test_a_table_that_speeds_up():
+    """r. = u + k Omega(t) J r with a constant u, from the two equations of the ball: a linear equation of order 1."""
+
+    def rate(t):
+        return 0.4 + 0.5 * np.sin(1.1 * t) ** 2
+
+    system = replace(BOOKS["ball on a turntable"].system, drive=lambda t, q: [-rate(t) * q[1], rate(t) * q[0]])
+    q = np.array([0.4, -0.3, 0, 0, 0])
+    v = system.consistent_velocity(q, [0.2, 0.5, 0, 0, 0.6], 0.0)
+    path = system.integrate(q, v, TIMES, progress=False)
+    k, u = 2 / 7, v[:2] - 2 / 7 * 0.4 * np.array([0.3, 0.4])
+    known = solve_ivp(
+        lambda t, r: u + k * rate(t) * np.array([-r[1], r[0]]), (0, 4), q[:2], "DOP853", TIMES, rtol=1e-12, atol=1e-12
+    )
+    np.testing.assert_allclose(path.q[:, :2], known.y.T, atol=1e-9)
+    assert balance(path) < 1e-9
+
+
+def pushed_sleigh():
+    """A sleigh with a motor along its blade, a steering moment, and both damped."""
+    book = textbook.chaplygin_sleigh(1.3, 0.4, 0.35, speed=0.9, turn_rate=1.7, heading=-0.6)
+
+    def drives(t, u, turn):
+        return 0.7 * np.sin(2 * t) - 0.3 * u, 0.5 * np.cos(t) - 0.2 * turn
+
+    def force(t, q, v):
+        c, s = np.cos(q[2]), np.sin(q[2])
+        along, moment = drives(t, c * v[0] + s * v[1], v[2])
+        return [along * c, along * s, moment]
+
+    return replace(book.system, applied=force), book, drives
+
+
+@pytest.mark.parametrize("method", ["auto", "RK45", "Radau", "LSODA"])
+def test_a_pushed_and_damped_sleigh(method):
+    """m (u. - a w^2) = F, (I + m a^2) w. + m a u w = moment, and the path (x, y, phi), integrated separately."""
+    system, book, drives = pushed_sleigh()
+
+    def reduced(t, z):
+        _, _, phi, u, w = z
+        along, moment = drives(t, u, w)
+        return [u * np.cos(phi), u * np.sin(phi), w, 0.35 * w**2 + along / 1.3, (moment - 1.3 * 0.35 * u * w) / j]
+
+    j = 0.4 + 1.3 * 0.35**2
+    known = solve_ivp(reduced, (0, 4), [0, 0, -0.6, 0.9, 1.7], "DOP853", TIMES, rtol=1e-12, atol=1e-12).y
+    rtol, bound = (1e-11, 1e-9) if method == "auto" else (1e-7, 3e-5)
+    path = system.integrate(book.q, book.v, TIMES, rtol, method=method, progress=False)
+    np.testing.assert_allclose(path.q, known[:3].T, atol=bound)
+    np.testing.assert_allclose(path.v[:, 2], known[4], atol=bound)
+    assert balance(path) < bound
+    assert np.abs(path.work).max() > 0.3
+    assert np.abs(path.reaction_work).max() < 1e-2 * bound + 1e-12  # the blade does no work
+    assert path.stats["method"] == ("DOP853" if method == "auto" else method)
+
+
+def test_the_work_is_the_integral_of_the_power():
+    system, book, _ = pushed_sleigh()
+    path = system.integrate(book.q, book.v, np.linspace(0, 4, 401), progress=False)
+    power = [v @ system.applied(t, q, v) for t, q, v in zip(path.t, path.q, path.v, strict=True)]
+    thirds = np.array([1, *[4, 2] * 199, 4, 1]) * 0.01 / 3  # Simpson's rule
+    assert path.work[-1] == pytest.approx(thirds @ power, abs=1e-8)
+
+
+def test_a_bead_in_the_plane_on_a_wire_that_swings():
+    """The wire's direction is a coordinate, psi. = W(t); -sin psi x. + cos psi y. = W (x cos psi + y sin psi) holds the bead on it.
+
+    In polar coordinates r.. = W^2 r. The torque on the wire, and the balance, from the bead's motion.
+    """
+
+    def rate(t):
+        return 0.6 + 0.9 * np.sin(1.3 * t)
+
+    def drive(t, q):
+        return [rate(t), rate(t) * (q[0] * np.cos(q[2]) + q[1] * np.sin(q[2]))]
+
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "psi"),
+        np.diag([1.3, 1.3, 0.4]),
+        lambda q: 0.0,
+        lambda q: [[0, 0, 1], [-np.sin(q[2]), np.cos(q[2]), 0]],
+        ("motor", "wire"),
+        drive,
+    )
+    q = np.array([0.8, 0.0, 0.0])
+    v = system.consistent_velocity(q, [-0.3, 0, 0], t=0.0)
+    np.testing.assert_allclose(v, [-0.3, 0.48, 0.6], atol=1e-15)
+    path = system.integrate(q, v, TIMES, progress=False)
+    known = solve_ivp(lambda t, z: [z[1], rate(t) ** 2 * z[0]], (0, 4), [0.8, -0.3], "DOP853", TIMES, rtol=1e-12, atol=1e-13).y
+    psi = 0.6 * TIMES + 0.9 / 1.3 * (1 - np.cos(1.3 * TIMES))
+    np.testing.assert_allclose(path.q, np.array([known[0] * np.cos(psi), known[0] * np.sin(psi), psi]).T, atol=1e-9)
+    push = 1.3 * (2 * known[1] * rate(TIMES) + known[0] * 0.9 * 1.3 * np.cos(1.3 * TIMES))  # across the wire
+    np.testing.assert_allclose(path.multipliers[:, 1], push, atol=1e-8)
+    assert balance(path) < 1e-9
+
+
+def test_a_position_that_is_driven_does_not_drift():
+    """x. = cos t: x = sin t to rounding, also at a loose tolerance; the rod of a pendulum besides is kept too."""
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "z"),
+        np.eye(3),
+        lambda q: 9.81 * q[1],
+        lambda q: [[q[0], q[1], 0], [0, 0, 1]],
+        ("rod", "motor"),
+        lambda t, q: [0, np.cos(t)],
+    )
+    path = system.integrate([1, 0, 0], [0, 0, 1], np.linspace(0, 20, 5), 1e-5, progress=False)
+    np.testing.assert_allclose(path.q[:, 2], np.sin(path.t), atol=1e-13)
+    np.testing.assert_allclose(np.hypot(*path.q.T[:2]), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize(("method", "bound"), [("auto", 1e-9), ("RK23", 1e-3), ("Radau", 1e-4), ("BDF", 1e-3), ("LSODA", 1e-4)])
+def test_a_driven_and_damped_oscillator(method, bound):
+    """m x.. + c x. + k x = F cos w t from rest at 0: the steady swing and a decaying free one."""
+    m, c, k, f, w = 1.3, 0.4, 2.1, 0.8, 1.1
+    system = one(lambda t, q, v: f * np.cos(w * t) - c * v[0], mass=m, stiffness=k)
+    path = system.integrate([0], [0], np.linspace(0, 20, 11), 1e-11 if method == "auto" else 1e-5, method=method, progress=False)
+    steady, sigma = f / (k - m * w**2 + 1j * c * w), np.roots([m, c, k])[0]
+    a = -steady.real  # x = Re(steady e^{iwt} + (a + i b) e^{sigma t}) is 0 at 0, and so is its rate
+    b = ((1j * w * steady).real + a * sigma.real) / sigma.imag
+    exact = (steady * np.exp(1j * w * path.t) + (a + 1j * b) * np.exp(sigma * path.t)).real
+    np.testing.assert_allclose(path.q[:, 0], exact, atol=bound)
+    assert balance(path) < bound
+
+
+def test_a_stiff_damper_is_found_stiff():
+    """x. relaxes to sin(t) at the rate 1e5."""
+    path = one(lambda t, q, v: -1e5 * (v - np.sin(t))).integrate([0], [0], [0, 2.0, 4.0], 1e-8, progress=False)
+    assert path.stats["method"] == "Radau"
+    np.testing.assert_allclose(path.v[1:, 0], np.sin(path.t[1:]) - 1e-5 * np.cos(path.t[1:]), atol=1e-7)
+    assert balance(path) < 1e-6
+
+
+def test_a_push_that_starts_late_from_rest():
+    """int (t - 5)^2 (6 - t)^2 dt = 1/30; at rest before, no tolerance is relative to anything."""
+    system = one(lambda t, q, v: ((t - 5) * (6 - t)) ** 2 if 5 < t < 6 else 0.0)
+    path = system.integrate([0], [0], [0, 4.0, 10.0], progress=False)
+    np.testing.assert_allclose(path.v[:, 0], [0, 0, 1 / 30], atol=1e-11)
+    assert path.work[-1] == pytest.approx(0.5 / 30**2, rel=1e-8)
+
+
+def test_a_short_push_is_found_with_a_shorter_step():
+    def push(t, q, v):
+        return np.exp(-(((t - 5.3) / 0.01) ** 2))
+
+    path = one(push).integrate([0], [0], [0, 10.0], 1e-8, max_step=0.02, progress=False)
+    assert path.v[-1, 0] == pytest.approx(0.01 * np.sqrt(np.pi), rel=1e-6)
+
+
+def test_back_in_time():
+    book = BOOKS["bead on a wire"]
+    there = book.integrate([0.0, 2.0], progress=False)
+    back = book.system.integrate(there.q[-1], there.v[-1], [2.0, 0.0], progress=False)
+    np.testing.assert_allclose(back.q[-1], book.q, atol=1e-10)
+    assert back.reaction_work[-1] == pytest.approx(-there.reaction_work[-1], abs=1e-10)
+
+
+def test_a_constant_drive_is_in_the_balance():
+    """The pendulum's pivot turns: theta. + ... a motor at the rate 1.7 on a spring k theta^2/2 does the work k (1.7 t)^2/2."""
+    system = MechanicalSystem.from_lagrangian("theta", [[0.3]], lambda q: q[0] ** 2, lambda q: [[1]], "motor", drive=1.7)
+    path = system.integrate([0], [1.7], [0, 1.0, 2.0], progress=False)
+    np.testing.assert_allclose(path.reaction_work, (1.7 * path.t) ** 2, atol=1e-9)
+
+
+def test_forces_and_drives_agree_with_the_reduced_form():
+    rng = np.random.default_rng(3)
+    system, _, _ = pushed_sleigh()
+    system = system.also([[0, 0, 1]], ["helm"], drive=lambda t, q: np.sin(t) + q[0])
+    q, t = rng.standard_normal(3), 0.7
+    v = system.consistent_velocity(q, rng.standard_normal(3), t)
+    assert np.abs(system.residual(q, v, t)).max() < 1e-14
+    saddle, reduced = system.accelerations(q, v, t=t), system.reduced(q, v, t)
+    np.testing.assert_allclose(saddle.acceleration, reduced.acceleration, rtol=1e-12)
+    np.testing.assert_allclose(saddle.multipliers, reduced.multipliers, rtol=1e-11)
+    assert saddle.acceleration[2] == pytest.approx(np.cos(t) + v[0], abs=1e-14)
+
+
+def test_momenta_count_applied_forces():
+    book = textbook.rolling_disc(1.3, 0.6, 0.4, 0.7, roll_rate=1.1, turn_rate=0.8)
+    system = replace(book.system, applied=lambda t, q, v: [0.3 * np.sin(t), 0, -0.2 * v[2], 0.1])
+    path = system.integrate(book.q, book.v, np.linspace(0, 4, 201), progress=False)
+    assert abs(symmetry_momenta(system, path.t, path.q, path.v).residual()).max() < 1e-6
+
+
+# As before
+
+
+def test_the_force_of_l_stays_and_can_be_replaced():
+    system, _, _ = pushed_sleigh()
+    q, v = np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6])
+    plain = textbook.chaplygin_sleigh(1.3, 0.4, 0.35, speed=0.9, turn_rate=1.7).system
+    np.testing.assert_array_equal(system.force(q, v), plain.force(q, v))
+    braked = replace(plain, force=lambda q, v: plain.force(q, v) - 0.2 * v)
+    applied = replace(plain, applied=lambda t, q, v: -0.2 * v)
+    np.testing.assert_allclose(braked.accelerations(q, v).acceleration, applied.accelerations(q, v, t=1.0).acceleration, atol=1e-15)
+
+
+# Refusals
+
+
+def bad_later(value):
+    return lambda t, q, v: value if t > 1 else 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"force": lambda t, q, v: [1, 2]}, r"f\(t, q, v\) must be of shape \(1,\); got \(2,\), at t = 0"),
+        ({"force": lambda t, q, v: np.nan}, r"f\(t, q, v\) must be finite; at t = 0 it is \[nan\]"),
+        ({"force": lambda t, q, v: "x"}, r"f\(t, q, v\) must be real numbers in double precision; got <U1, at t = 0"),
+        ({"force": lambda t, q, v: 1j}, r"f\(t, q, v\) must be real numbers in double precision; got complex128, at t = 0"),
+        ({"force": lambda q, v: 0.0}, r"f must be a function of t, q, v, f\(t, q, v\); too many positional arguments"),
+        ({"force": [1.0]}, r"f must be a function of t, q, v; got \[1.0\]"),
+        ({"drive": lambda t, q: [0, 1]}, r"b\(t, q\) must be of shape \(1,\); got \(2,\), at t = 0"),
+        ({"drive": lambda t, q: [np.inf]}, r"b\(t, q\) must be finite; at t = 0 it is \[inf\]"),
+        ({"drive": lambda t: 0.0}, r"b must be a function of t, q, b\(t, q\); too many positional arguments"),
+    ],
+)
+def test_what_is_no_force_or_drive_is_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        one(**given).integrate([0], [0], [0, 2.0], progress=False)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"force": bad_later(np.nan)}, r"beyond t = (1|0\.99999\d*): f\(t, q, v\) must be finite; at t = 1.* it is \[nan\]"),
+        ({"force": bad_later([1, 2])}, r"beyond t = (1|0\.99999\d*): f\(t, q, v\) must be of shape \(1,\); got \(2,\), at t = 1"),
+        ({"drive": lambda t, q: np.nan if t > 1 else 0.0}, r"beyond t = (1|0\.99999\d*): b"),
+        ({"drive": lambda t, q: 1.0 if t > 1 else 0.0}, r"beyond t = (1|0\.99999\d*): the drive b\(t, q\) of drive jumps there"),
+    ],
+)
+def test_what_goes_wrong_later_is_named_with_its_time(given, message):
+    with pytest.raises(RuntimeError, match=message):
+        one(**given).integrate([0], [0], [0, 2.0], progress=False)
+
+
+def test_a_jump_that_an_implicit_method_passes_is_said():
+    system = one(drive=lambda t, q: 1.0 if t > 1 else 0.0)
+    with pytest.warns(UserWarning, match="Radau: at t = 2 the velocity violates the constraint of drive by over 1 %"):
+        system.integrate([0], [0], [0, 2.0], 1e-6, method="Radau", progress=False)
+
+
+def test_what_depends_on_time_needs_it():
+    system, book = BOOKS["bead on a wire"].system, BOOKS["bead on a wire"]
+    for call in (system.accelerations, system.reduced, system.consistent_velocity, system.residual):
+        with pytest.raises(ValueError, match="depend on time: give t"):
+            call(book.q, book.v)
+    with pytest.raises(ValueError, match=r"that of motor is off by 1: take consistent_velocity\(q, v, t\)"):
+        system.integrate(book.q, [*book.v[:1], book.v[1] + 1], [0, 1.0])
+    with pytest.raises(ValueError, match="max_step must be a positive finite number"):
+        system.integrate(book.q, book.v, [0, 1.0], max_step=0)
+    with pytest.raises(ValueError, match=r"force must be a function of q, v, force\(q, v\); missing a required argument"):
+        replace(system, force=lambda t, q, v: 0 * q)
+
+
+def test_a_balance_that_does_not_close_is_said():
+    """RK23 at a loose tolerance loses energy that no force takes."""
+    system = one(lambda t, q, v: 1e-3 * np.cos(t), stiffness=1.0)
+    with pytest.warns(UserWarning, match="RK23: energy - energy.0. is the work of forces and drives, but at t = "):
+        system.integrate([1], [0], np.linspace(0, 200, 5), 1e-2, method="RK23", progress=False)
