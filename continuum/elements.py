@@ -190,7 +190,7 @@ class Elements:
         span = 0.0, max(float(times[-1]), 1e-300)
         found = solve_ivp(rate, span, self.start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
         if not found.success:
-            raise ValueError(f"the field could not be integrated: {found.message}")
+            raise ValueError(f"the field could not be integrated: {found.message}; ask for a larger tol or a shorter duration")
         unknowns: Float = found.y.T.reshape(len(times), 6, -1)
         return unknowns
 

@@ -23,6 +23,15 @@ class Ring(NamedTuple):
     omega: Float
 
 
+class _Collapse:
+    """The event a = 0 of a ring, at which SciPy's solver stops."""
+
+    terminal = True
+
+    def __call__(self, _: float, state: Float) -> float:
+        return float(state[0])
+
+
 def _collapse(a0: float, inward: float, nu: float) -> float:
     """The first time at which a_0 cos(nu t) - inward sin(nu t)/nu is zero."""
     if nu > 0:
@@ -83,12 +92,8 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
         inertia = rod.spin_inertia + rod.density * r**2 * h**2
         return [-r * h * omega, omega, r * h * (rod.density * r**2 * h * slope * omega**2 * g / a0 + stiffness * a) / inertia]
 
-    def point(_: float, state: Float) -> float:
-        return float(state[0])
-
-    point.terminal = True  # type: ignore[attr-defined]
     span = 0.0, max(float(t[-1]), 1e-300)
-    found = solve_ivp(rate, span, [a0, 0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14, events=point)
+    found = solve_ivp(rate, span, [a0, 0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14, events=_Collapse())
     if found.t_events[0].size:
         raise ValueError(f"the ring is a point at t = {found.t_events[0][0]:g}; ask for earlier times")
     return Ring(*found.y)

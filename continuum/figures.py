@@ -23,6 +23,10 @@ from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, SIGNED, 
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 
 
+def _sheet() -> Figure:
+    return Figure(figsize=(6.8, 4.6), layout="constrained")
+
+
 def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, duration: float = 1.0) -> Float:
     """Growth rates (modes,) of waves 1, 2, ... of n discs that roll sideways at the rate omega, measured in one simulation.
 
@@ -57,7 +61,7 @@ def measured_growth(rod: Rod, omega: float, rolling: str, n: int, modes: int, du
 
 def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: Axes | None = None) -> Axes:
     """Growth rate against wave number of the straight rolling rod: field and n discs, both laws, measured rates as points."""
-    ax = Figure(figsize=(6.8, 4.6), layout="constrained").subplots() if ax is None else ax
+    ax = _sheet().subplots() if ax is None else ax
     most = 2 * np.pi * (modes + 0.5) / rod.length
     q, k = np.linspace(1e-3, most, 400), rod.length / n
     at = 2 * np.pi * np.arange(1, modes + 1) / rod.length
@@ -104,7 +108,9 @@ def main(folder: str) -> None:
     """Draw both pictures of docs/continuum.md."""
     path = Path(folder)
     fluxes(untwisting_rod()).savefig(path / "fluxes.png", dpi=150)
-    dispersion(untwisting_rod().rod).figure.savefig(path / "dispersion.png", dpi=150)  # type: ignore[union-attr]
+    waves = _sheet()
+    dispersion(untwisting_rod().rod, ax=waves.subplots())
+    waves.savefig(path / "dispersion.png", dpi=150)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ different values of r'.
   had at the start of that run, at most k.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,14 +61,15 @@ class Given:
     def _read(self, values: ArrayLike, size: int) -> Float:
         if self._rows == 1:
             return checks.field(self.name, values, size)[None]
+        rows = tuple(values) if isinstance(values, Iterable) else ()
         try:
             shape = str(np.shape(values))
         except ValueError:  # x and y of unequal lengths
-            shape = ", ".join(str(np.shape(row)) for row in values)  # type: ignore[union-attr]
+            shape = ", ".join(str(np.shape(row)) for row in rows)
         if shape != str((2, size)):
             asked = f" where s has shape ({size},): it is evaluated between the nodes too" if self.call else ""
             raise ValueError(f"{self.name} must give x and y, an array of shape {(2, size)}{asked}; got shape {shape}")
-        return np.array([checks.field(self.name, row, size) for row in values])  # type: ignore[union-attr]
+        return np.array([checks.field(self.name, row, size) for row in rows])
 
     def at(self, s: Float, degree: int = DEGREE) -> Float:
         """Values at places s, (rows, s.size); those of an array by a spline."""

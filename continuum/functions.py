@@ -1,4 +1,4 @@
-"""The basis functions of a field: polynomials between free ends, Fourier series on a closed rod."""
+"""The functions in which a field is expanded: polynomials between free ends, Fourier series on a closed rod."""
 
 from collections.abc import Callable
 from functools import lru_cache

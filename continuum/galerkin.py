@@ -9,8 +9,8 @@ d'Alembert's principle reads, for every psi,
 Collocation would replace e psi by the polynomial through its values at the nodes. The slope of this polynomial at the end differs
 from that of e psi, the tangential part of r'' does work on the difference, and all fields get an error of first order in the
 spacing at the end. Instead, r moves by the projection P(e omega), defined so that int Re(conj(r'') f'') is the same for f and P f
-with every r'' of the basis: (P f)'' is the L2 projection of f''. The two numbers that r'' does not determine are the values of f at
-the ends (on a closed rod the one number is the mean). So
+for every r'' that the functions form: (P f)'' is the L2 projection of f''. The two numbers that r'' does not determine are the
+values of f at the ends (on a closed rod the one number is the mean). So
 
     r. = P (e omega),   theta. = omega,   pi = sqrt(w (alpha + rho |e|^2)) omega at nodes of weight w
 
