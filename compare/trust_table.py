@@ -113,7 +113,7 @@ class Trust:
                 words = f"estimate over error {r.ratio:.0f}, tolerance over estimate {r.tol / r.estimate:.2g}"
                 lines.append(f"* cautious: {r.scene} ({r.kind}, {r.law}, {r.by}), {words}")
             if r.unlike > LEAST:
-                lines.append(f"* unlike the chains: {r.scene} ({r.kind}, {r.law}), by {r.unlike:.0f} times what they err")
+                lines.append(f"* unlike the chains: {r.scene} ({r.kind}, {r.law}), difference {r.unlike:.0f} times their error")
             if r.outcome == "refused":
                 lines.append(f"* refused: {r.scene} ({r.kind}, {r.law}, {r.by}), tol {r.tol:.1e}: {r.says} ({r.shown})")
         lines += [f"* broken: {r.case}: {r.error}" for r in self.failed]
