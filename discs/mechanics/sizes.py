@@ -50,6 +50,8 @@ class Sizes:
     y : the initial state, (2m + charges + works,); rates : its rates at the start and, if they depend on t, at other times.
     charges : number of charges mu, c or 0.
 
+    Attributes
+    ----------
     unit : (m,), see `units`; speed : sqrt(2 T), the largest so far; shift : (m,), the largest displacement so far.
     """
 
