@@ -50,6 +50,8 @@ class Formula:
     shape : of its values; () is a number.
     size : m.
     arguments : what messages call q; for a function of t and q that is given as one of the vector (t, q), "t, q".
+    cancels : whether values are small differences of terms, as of a constraint phi(q, v) that is 0: rounding then is relative to
+        the terms, which are judged by the change of f where one argument is set to 0.
 
     Attributes
     ----------
@@ -57,10 +59,19 @@ class Formula:
     error : estimated error of its last derivatives, relative to their largest entry; 0 for the complex step.
     """
 
-    def __init__(self, name: str, call: Callable[[Float], Any], shape: tuple[int, ...], size: int, arguments: str = "q") -> None:
+    def __init__(
+        self,
+        name: str,
+        call: Callable[[Float], Any],
+        shape: tuple[int, ...],
+        size: int,
+        arguments: str = "q",
+        cancels: bool = False,
+    ) -> None:
         self.name, self.shape, self.size, self.arguments = name, shape, size, arguments
         self.how, self.error = "complex step", 0.0
         self._call = call
+        self._cancels, self._terms = cancels, 0.0  # size of the terms of f where they cancel
         self._steps: Float | None = None  # (m,), of real differences
         self._verified = False  # whether the complex step agreed with real differences once
         self._slack = 0.0  # relative difference from real differences that rounding was found to explain
@@ -171,6 +182,8 @@ class Formula:
 
     def _examine(self, q: Float) -> Float:
         """df/dq by real differences with steps sought anew, and whether the complex step agrees with it."""
+        if self._cancels:
+            self._terms = max(self._terms, *(self._change(q, q * others) for others in 1 - np.eye(self.size)))
         found, errors, steps = zip(*(self._search(q, k) for k in range(self.size)), strict=True)
         self._steps, whole = np.array(steps), np.stack(found, axis=-1)
         size = float(np.abs(whole).max(initial=0.0))
@@ -220,7 +233,7 @@ class Formula:
 
     def _pairs(self, q: Float, d: Float, count: int) -> tuple[Float, float] | None:
         """f(q + j d) - f(q - j d), j = 1 ... count, and the largest |f|; None if one of them is not finite."""
-        found, size = [], 0.0
+        found, size = [], self._terms
         for j in range(1, count + 1):
             try:
                 after, before = self(q + j * d), self(q - j * d)
@@ -231,6 +244,14 @@ class Formula:
             size = max(size, float(np.abs(after).max(initial=0.0)), float(np.abs(before).max(initial=0.0)))
             found.append(after - before)
         return (np.array(found), size) if np.isfinite(size) else None
+
+    def _change(self, q: Float, other: Float) -> float:
+        """The largest difference of values at q and another place; 0 where there are none."""
+        try:
+            change = np.abs(self(q) - self(other)).max(initial=0.0)
+        except (ArithmeticError, ValueError):
+            return 0.0
+        return float(change) if np.isfinite(change) else 0.0
 
     def _array(self, given: Any, dtype: type | None) -> Float:
         """A formula's value as a new array of the right shape; one row may be given as a vector."""

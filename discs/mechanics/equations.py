@@ -191,19 +191,19 @@ class Equations:
     def consistent_velocity(self, q: ArrayLike, v: ArrayLike, t: float | None = None) -> Float:
         """The velocity u nearest to v that the constraints allow: A u = b and (u - v).M(u - v) least, (m,).
 
-        Then M (u - v) = A^T mu: an impulse of the constraint forces changes v to u. For phi(q, u) = b, A = d phi/dv at u: the
-        equations are linearised at the last u and solved again until u is on the constraint.
+        Then M (u - v) = A^T mu: an impulse of the constraint forces changes v to u. For phi(q, u) = b that is repeated with A =
+        d phi/dv at the last u, Newton's method along M^-1 A^T; u is the nearest velocity up to terms of second order in u - v.
 
         Raises
         ------
-        ValueError : also if there is no such u near v.
+        ValueError : also if Newton's method finds no such u.
         """
         q, v = self._vectors(q, v)
         mass, b, u = self.mass(q), self.level(q, t), v
-        for _ in range(1 if self.phi is None else 100):
+        for _ in range(1 if self.phi is None else 50):
             rows = self.rows(q, u)
             level = b if self.phi is None else b - self.phi(q, u) + rows @ u
-            before, u = u, saddle.solve(mass, rows, mass @ v, level, self.names, self.owners)[0]
+            before, u = u, saddle.solve(mass, rows, mass @ u, level, self.names, self.owners)[0]
             if self.phi is None or _square(mass, u - before) <= 1e-24 * _square(mass, u):
                 return u
         raise ValueError(f"no velocity near v = {v} was found that obeys the constraints at q = {q}; start from another v")

@@ -47,7 +47,7 @@ class Given:
         def of_one(z: Float) -> Any:
             return call(*z[: self.timed], *np.split(z[self.timed :], vectors))
 
-        self.formula = Formula(name, of_one, (size,), self.timed + vectors * m, arguments)
+        self.formula = Formula(name, of_one, (size,), self.timed + vectors * m, arguments, cancels=name == "phi")
 
     def __call__(self, *parts: Float | float) -> Float:
         """The values, (size,)."""

@@ -12,6 +12,9 @@ steps. The difference of the two results times sigma^2 is c. Closed rows are acc
 their c is a property of the initial data: up to `MISS` the motion passes through the branch point; above it, the steps follow the
 turn, and a step that would cross the moment is repeated with a shorter length. For other rows c contains the errors of the steps;
 if it is larger than these, an error ends the integration.
+
+Rows d phi/dv of constraints that are not linear in v may also vanish, as for v.v = 0, or be reversed, and the motion may branch
+there. These moments are detected and end the integration, but they are not predicted or crossed.
 """
 
 from collections.abc import Callable
@@ -51,7 +54,8 @@ class RankDrops:
     def __init__(self, system: Equations, sizes: Sizes, drift: Drift) -> None:
         self.system, self.sizes, self.drift, self.m = system, sizes, drift, sizes.m
         self.norms = np.zeros(len(system.owners))
-        self.watched = system.phi is None and 0 < len(system.owners) * len(system.names) <= LARGEST
+        self.linear, self.reversed = system.phi is None, False
+        self.watched = 0 < len(system.owners) * len(system.names) <= LARGEST
         self.sigma, self.largest, self.owners, self.held = np.inf, 0.0, "", True
         self.tried = np.inf
         self.rows: Float | None = None  # A of the last state, scaled
@@ -60,14 +64,20 @@ class RankDrops:
         """Whether det(A A_0^T), A_0 of the last state, is negative: a step crossed dependent rows by accident."""
         if not self.watched or self.rows is None or not np.isfinite(y).all():
             return False
-        rows = dense(self.system.constraint(y[: self.m])) * self.sizes.unit
-        return bool(np.linalg.det((rows / self._norms()) @ self.rows.T) < 0)
+        rows = dense(self.system.rows(y[: self.m], y[self.m : 2 * self.m])) * self.sizes.unit
+        self.reversed = bool(np.linalg.det((rows / self._norms()) @ self.rows.T) < 0)
+        return self.reversed
 
     def _norms(self) -> Float:
         return np.where(self.norms > 0, self.norms, 1.0)[:, None]
 
     def words(self) -> str:
         """The message of an integration that dependent rows end; empty if they do not."""
+        if self.watched and self.reversed and not self.linear:
+            return (
+                f"the rows d phi/dv of the constraints of {', '.join(dict.fromkeys(self.system.owners))} vanish there, or are "
+                "reversed: the constraints are singular, and the motion may branch; stop earlier, or write them differently"
+            )
         if not self.watched or self.sigma >= NEAR * self.largest:
             return ""
         return (
@@ -108,8 +118,8 @@ class RankDrops:
 
     def _time_to_zero(self, y: Float, direction: float) -> float:
         q, v = y[: self.m], y[self.m : 2 * self.m]
-        rows = dense(self.system.constraint(q)) * self.sizes.unit
-        self.norms = np.maximum(self.norms, np.linalg.norm(rows, axis=1))
+        rows, norms = dense(self.system.rows(q, v)) * self.sizes.unit, self.norms if self.linear else 0.0
+        self.norms = np.maximum(norms, np.linalg.norm(rows, axis=1))
         norms = self._norms()
         self.rows = rows / norms
         left, values, right = np.linalg.svd(self.rows, full_matrices=False)
@@ -119,6 +129,8 @@ class RankDrops:
         theirs = weight > 0.1 * weight.max()
         self.owners = ", ".join(dict.fromkeys(o for o, w in zip(self.system.owners, theirs, strict=True) if w))
         self.held = bool(self.drift.rows[theirs].all())
+        if not self.linear:
+            return np.inf
         change = dense(self.system.constraint_rate(q, v)) * self.sizes.unit / norms
         falls = -direction * float(left[:, -1] @ change @ right[-1])
         return self.sigma / falls if falls > 0 else np.inf

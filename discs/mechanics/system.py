@@ -33,11 +33,12 @@ class MechanicalSystem(Equations):
         names: Sequence[str],
         mass: Callable[[Float], ArrayLike] | ArrayLike,
         potential: Callable[[Float], Any],
-        constraint: Callable[[Float], ArrayLike],
-        owners: Sequence[str],
+        constraint: Callable[[Float], ArrayLike] | None = None,
+        owners: Sequence[str] = (),
         drive: Drive = 0.0,
         symmetry: Callable[[Float], ArrayLike] | None = None,
         force: Callable[[float, Float, Float], ArrayLike] | None = None,
+        phi: Callable[[Float, Float], ArrayLike] | None = None,
     ) -> "MechanicalSystem":
         """A system from M (or M(q)), V(q) and A(q), formulas that take q (m,) and return numbers.
 
@@ -50,11 +51,13 @@ class MechanicalSystem(Equations):
         names : m names of coordinates.
         mass : M (m, m), symmetric, or q -> M.
         potential : q -> V.
-        constraint : q -> A (c, m); c may be 0, with no owners.
+        constraint : q -> A (c, m); without it, and without owners, there are no constraints.
         owners : c names, the owner of each row.
         drive : b of A v = b: c numbers, or a function t, q -> b (c,), smooth in t and q.
         symmetry : as the attribute.
         force : t, q, v -> Q (m,), generalised forces beside those of L, as of dampers and actuators; the attribute `applied`.
+        phi : q, v -> phi (c,), instead of A, of constraints phi(q, v) = b that are not linear in v; the reaction is that of
+            Chetaev's rule, see `discs.mechanics.equations`.
 
         Raises
         ------
@@ -62,7 +65,11 @@ class MechanicalSystem(Equations):
         """
         names, owners = names_of("names", names), names_of("owners", owners)
         m, c = len(names), len(owners)
-        rows = Formula("A", function_of("q", "A", constraint), (c, m), m)
+        if constraint is not None and phi is not None:
+            raise ValueError("give the constraints as A(q) or as phi(q, v), not both: rows that are linear in v can be part of phi")
+        if constraint is None:
+            none = np.zeros((0 if phi is None else c, m))  # in the place of A
+        rows = Formula("A", (lambda q: none) if constraint is None else function_of("q", "A", constraint), (c, m), m)
         height = Formula("V", function_of("q", "V", potential), (), m)
         inertia = Formula("M", function_of("q", "M", mass) if callable(mass) else lambda q: mass, (m, m), m)
         given = tuple(_shape_of(formula) for formula in (rows, inertia))
@@ -91,8 +98,9 @@ class MechanicalSystem(Equations):
             rows.along,
             drive if callable(drive) else np.asarray(drive),
             None if symmetry is None else lambda q: np.asarray(symmetry(q), dtype=float),
-            (height, rows) if constant is not None else (height, rows, inertia),
+            (height, *(() if phi else (rows,)), *(() if constant is not None else (inertia,))),
             force,
+            phi,
         )
 
     def also(self, rows: ArrayLike, owners: Sequence[str], drive: Drive = 0.0) -> "MechanicalSystem":
@@ -104,16 +112,19 @@ class MechanicalSystem(Equations):
         extra = scipy.sparse.csr_array(np.atleast_2d(np.asarray(rows, dtype=float)))
         if extra.shape != (len(owners), len(self.names)):
             raise ValueError(f"rows must have shape ({len(owners)}, {len(self.names)}), one row per owner; got {extra.shape}")
+        joined = _joined(self.drive, drive if callable(drive) else checks.field("drive", drive, len(owners)))
+        both = (*self.owners, *owners)
+        if isinstance(phi := self.phi, Given):
+            return replace(self, owners=both, drive=joined, phi=lambda q, v: np.hstack([phi.call(q, v), extra @ v]))
         none = scipy.sparse.csr_array(extra.shape)
-        drive = drive if callable(drive) else checks.field("drive", drive, len(owners))
         return replace(
             self,
-            owners=(*self.owners, *owners),
+            owners=both,
             constraint=lambda q: scipy.sparse.vstack([scipy.sparse.csr_array(self.constraint(q)), extra], format="csr"),
             constraint_rate=lambda q, v: scipy.sparse.vstack(
                 [scipy.sparse.csr_array(self.constraint_rate(q, v)), none], format="csr"
             ),
-            drive=_joined(self.drive, drive),
+            drive=joined,
         )
 
     def integrate(

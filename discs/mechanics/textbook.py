@@ -228,3 +228,38 @@ def nonholonomic_particle(mass: float, width: float, *, y: float, velocity: tupl
 
     q, v, _ = exact(0.0)
     return Textbook(system, q, v, exact, {"along": lambda q, v: float(v[0] * root(q[1]))})
+
+
+def appell_hamel(mass: float, ratio: float, gravity: float, *, velocity: tuple[float, float, float]) -> Textbook:
+    r"""Appell and Hamel's weight: x.^2 + y.^2 = rho^2 z.^2, not linear in the velocities, V = m g z; rho = `ratio`.
+
+    In the machine a thread over pulleys is wound on a wheel that rolls below the weight. With Chetaev's reaction, 2 lambda (x., y.,
+    -rho^2 z.), the direction (x., y.)/s., s. = sqrt(x.^2 + y.^2), is constant, and s. = +-rho z. gives
+
+        m s.. = 2 lambda s.,   m z.. = -m g - 2 lambda rho^2 z.:   z.. = -g/(1 + rho^2),   lambda = m s../(2 s.).
+
+    The closed form ends when the weight is at rest: there the constraint is singular, and any direction can follow.
+
+    Source: P. Appell, Rend. Circ. Mat. Palermo 32 (1911) 48-50; G. Hamel, Theoretische Mechanik, Springer 1949. Neimark and Fufaev
+    show that the limit of small wheels, from which the constraint comes, also allows other motions. `velocity` obeys the
+    constraint.
+    """
+    positive(mass=mass, ratio=ratio, gravity=gravity)
+    x, y, z = checks.vector("velocity", velocity, 3)
+    if not np.isclose(np.hypot(x, y), ratio * abs(z), rtol=1e-9, atol=0) or not z:
+        raise ValueError(f"velocity must obey x.^2 + y.^2 = {ratio:g}^2 z.^2 and not be 0; got {velocity}")
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y", "z"),
+        mass * np.eye(3),
+        lambda q: mass * gravity * q[2],
+        owners=("wheel",),
+        phi=lambda q, v: v[0] ** 2 + v[1] ** 2 - (ratio * v[2]) ** 2,
+    )
+    fall = -gravity / (1 + ratio**2)
+
+    def exact(t: float) -> tuple[Float, Float, Float]:
+        v = np.array([x, y, z]) * (1 + fall * t / z)
+        return np.array([x, y, z]) * (t + 0.5 * fall * t**2 / z), v, np.array([0.5 * mass * fall / v[2]])
+
+    q, v, _ = exact(0.0)
+    return Textbook(system, q, v, exact)
