@@ -8,7 +8,6 @@ from typing import TypeVar
 
 from tqdm import tqdm
 
-from compare import figures
 from compare.lump import lump
 from compare.outputs import fresh_files
 from compare.results import Study, format_table, write_csv
@@ -47,6 +46,8 @@ def overview(
     kinds = ("springs",) if scene.closed or scene.steered else ("springs", "consistent")
     for ends in kinds:
         checked_sizes(scene, n, ends)
+    from compare import figures  # and matplotlib, for the process that draws
+
     long = scene if scene.closed else replace(scene, duration=LONG * scene.duration)
     with fresh_files(out) as folder:
         energies = executor.submit(energy_runs, long) if executor else None

@@ -27,7 +27,7 @@ from textwrap import shorten
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy  # its parts, slow to import, when they are used
 
 from compare.lump import lump
 from compare.random_scenes import Drawn, random_scene
@@ -207,7 +207,7 @@ def _at(scene: Scene, field: Solution, name: str, s: Float) -> Float:
     if scene.closed:
         more = {"x": scene.shift[0], "y": scene.shift[1], "phi": 2 * np.pi * scene.turns}.get(name, 0.0)
         places, values = np.append(places, scene.rod.length), np.concatenate([values, values[:, :1] + more], axis=1)
-    found: Float = make_interp_spline(places, values, 5, axis=1)(s)
+    found: Float = scipy.interpolate.make_interp_spline(places, values, 5, axis=1)(s)
     return found
 
 

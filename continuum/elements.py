@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 from numpy.polynomial import legendre
-from scipy.integrate import solve_ivp
 
 from continuum.initial import resolve
 from continuum.pieces import POINTS
@@ -188,7 +188,7 @@ class Elements:
             return self.rate(t, flat)
 
         span = 0.0, max(float(times[-1]), 1e-300)
-        found = solve_ivp(rate, span, self.start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
+        found = scipy.integrate.solve_ivp(rate, span, self.start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
         if not found.success:
             raise ValueError(f"the field could not be integrated: {found.message}; ask for a larger tol or a shorter duration")
         unknowns: Float = found.y.T.reshape(len(times), 6, -1)

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from continuum.dispersion import frequency, growth, symbols
 from continuum.rod import Rod
@@ -93,7 +92,9 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
         return [-r * h * omega, omega, r * h * (rod.density * r**2 * h * slope * omega**2 * g / a0 + stiffness * a) / inertia]
 
     span = 0.0, max(float(t[-1]), 1e-300)
-    found = solve_ivp(rate, span, [a0, 0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14, events=_Collapse())
+    found = scipy.integrate.solve_ivp(
+        rate, span, [a0, 0.0, omega], t_eval=t, method="DOP853", rtol=1e-13, atol=1e-14, events=_Collapse()
+    )
     if found.t_events[0].size:
         raise ValueError(f"the ring is a point at t = {found.t_events[0][0]:g}; ask for earlier times")
     return Ring(*found.y)
@@ -237,7 +238,7 @@ def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, C
         sin, cos, tanh = np.sin(q * half), np.cos(q * half), np.tanh(p * half)
         return float(second**2 * sin - first * cos * tanh if odd else first * sin + second**2 * cos * tanh)
 
-    q = float(brentq(end, max(mode - 1, 1e-6) * np.pi / length, mode * np.pi / length, xtol=1e-15, rtol=1e-14))
+    q = float(scipy.optimize.brentq(end, max(mode - 1, 1e-6) * np.pi / length, mode * np.pi / length, xtol=1e-15, rtol=1e-14))
     p, second, _ = ratios(q)
 
     def g(s: Float) -> Float:

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError
 from tqdm import tqdm
 
 from continuum.free_start import Given, through
@@ -114,14 +113,14 @@ def run(chain: Chain, start: Start, h: float, times: Float, bar: tqdm) -> Run:
         with np.errstate(over="ignore", invalid="ignore"):
             z = State(r, system.admissible(r, v), theta[0], omega[0])
             watch = Watch(system, chain, z, h)
-    except LinAlgError:
+    except np.linalg.LinAlgError:
         raise ValueError("r0 or v0 is too large: numbers overflow") from None
     found, step = [], 0
 
     def moved(z: State, h: float, time: float) -> State:
         try:
             after = system.advance(z, h)
-        except LinAlgError as error:
+        except np.linalg.LinAlgError as error:
             fastest = int(np.argmax(np.hypot(*z.v)))
             raise SimulationError(f"{error}; take a smaller dt than {h:g}", step, step * h, fastest) from None
         watch(z, after, step + 1, time)

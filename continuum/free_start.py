@@ -15,8 +15,8 @@ different values of r'.
 from collections.abc import Callable, Iterable
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike
-from scipy.interpolate import make_interp_spline
 
 from continuum.elements import lobatto
 from discs import Chain, checks
@@ -97,7 +97,7 @@ def through(chain: Chain, values: Float, degree: int = DEGREE, offset: float = 0
         s = np.concatenate([s - chain.length, s, s + chain.length])
         values = np.concatenate([values] * 3, axis=-1)
     most = max(1, s.size - 1 - (DEGREE - degree))
-    spline: Spline = make_interp_spline(s, values, degree if degree <= most else most - (most % 2 == 0), axis=-1)
+    spline: Spline = scipy.interpolate.make_interp_spline(s, values, degree if degree <= most else most - (most % 2 == 0), axis=-1)
     return spline
 
 

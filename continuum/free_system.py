@@ -31,8 +31,7 @@ energy of the centre line oscillates by O(h^2), as long as h is short compared w
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.linalg import LinAlgError, solve_banded
+import scipy  # its parts, slow to import, when they are used
 
 from discs import Chain
 from discs.arrays import Float, Int
@@ -66,7 +65,8 @@ class Banded:
         shape = 2 * self._width + 1, right.size
         matrix = np.bincount(self._slots, entries, shape[0] * shape[1]).reshape(shape)
         both = self._width, self._width
-        solution: Float = solve_banded(both, matrix, right[self._order], overwrite_ab=True, check_finite=False)[self._back]
+        found = scipy.linalg.solve_banded(both, matrix, right[self._order], overwrite_ab=True, check_finite=False)
+        solution: Float = found[self._back]
         return solution
 
 
@@ -93,7 +93,7 @@ class FreeRod:
         bending, torsion = self._springs.hessians()
         order = folded(n) if chain.ends == "ring" else np.arange(n)
         # unknowns of Newton's method (x, y, mu), ordered so that those of a node and its link are neighbours
-        bends, nodes = sp.coo_array(bending), np.arange(2 * n)
+        bends, nodes = scipy.sparse.coo_array(bending), np.arange(2 * n)
         self._bends = np.tile(bends.data, 2)
         tips = [(2 * n + here, tip + a * n) for a in (0, 1) for tip in (self._first, self._second)]
         places = [(bends.row + a * n, bends.col + a * n) for a in (0, 1)] + [(nodes, nodes)]
@@ -103,7 +103,7 @@ class FreeRod:
         # L M^{-1} L^T couples neighbouring links
         self._pairs = a, b = (here, (here + 1) % n) if chain.ends == "ring" else (here[:-1], here[1:])
         self._triangle = Banded([(here, here), (a, b), (b, a)], order[order < here.size])
-        twists, nodes = sp.coo_array(torsion), np.arange(n)
+        twists, nodes = scipy.sparse.coo_array(torsion), np.arange(n)
         self._twists = twists.data
         self._roll = Banded([(twists.row, twists.col), (nodes, nodes)], order)
 
@@ -180,7 +180,7 @@ class FreeRod:
             if np.abs(change[: 2 * n]).max() <= 1e-9 * self._k:  # quadratic convergence: the next change would be its square
                 moved = r + u
                 return moved, self.admissible(moved, u / h - 0.5 * h * (bent + 0.5 * self.bent(u)) / self._mass)
-        raise LinAlgError("Newton's method does not converge")
+        raise np.linalg.LinAlgError("Newton's method does not converge")
 
     def twist(self, theta: Float, omega: Float, h: float) -> tuple[Float, Float]:
         """theta and omega after a step h of the midpoint rule; they do not depend on the centre line."""

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 from tqdm import tqdm
 
 from continuum.bounds import FIELDS, bounds, missed, over
@@ -190,5 +190,5 @@ def spline(scene: Scene, s: Float, values: Float) -> Spline:
     ends = "not-a-knot"
     if scene.closed:
         s, values, ends = np.append(s, scene.rod.length), np.concatenate([values, values[:, :1]], axis=1), "periodic"
-    through: Spline = CubicSpline(s, values.T, bc_type=ends)
+    through: Spline = scipy.interpolate.CubicSpline(s, values.T, bc_type=ends)
     return through

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from textwrap import shorten
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 
-from compare import figures
 from compare.background import background
 from compare.hardcases.cases import Case, cases
 from compare.hardcases.problems import rolling_waves
@@ -22,6 +20,9 @@ from compare.results import Growth
 from compare.sweeps import Result, read, sweep
 from discs import checks
 from discs.running.tolerance import USUAL
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 SECONDS = {True: 1.0, False: 60.0}  # limit for a run: quick, or not
 PEER_SECONDS = 2.0  # peers are many, and slow
@@ -174,8 +175,10 @@ class Stability:
             found.setdefault(size, {}).setdefault(row.method, []).append((float(step.split()[0]), drift, row.found.unconverged))
         return list(found.items())[-1] if found else ("", {})
 
-    def plot(self, path: str | Path | None = None) -> list[Axes]:
+    def plot(self, path: str | Path | None = None) -> "list[Axes]":
         """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
+        from compare import figures
+
         axes = figures.stability(*self.drifts(), self.waves)
         if path is not None:
             figures.save(axes[0], path)
