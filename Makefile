@@ -1,4 +1,4 @@
-# make run: the main job, results in out/.   make test: the whole suite.   Both make .venv first.
+# make run: the main job, results in out/.   make test: the suite, as in CI.   make long: every test.   All make .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
 INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python
@@ -11,7 +11,7 @@ export NO_MKDOCS_2_WARNING := 1
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
     $(addprefix continuum/test_, cells.py lattice.py lagrangian.py))
 
-.PHONY: run test quick lint types kernels field docs minimal coverage clean
+.PHONY: run test long quick lint types kernels field docs minimal coverage clean
 
 run: .venv/run
 	$(BIN)/python -m compare --out out
@@ -19,6 +19,10 @@ run: .venv/run
 # side by side, as two cores are what every machine has
 test: .venv/dev
 	$(MAKE) --no-print-directory --jobs 4 lint types kernels field
+	$(BIN)/pytest -m "not long"
+
+# before a release: all lessons too, and every peer on every chain
+long: .venv/dev kernels field
 	$(BIN)/pytest
 
 # a contributor's loop: no lessons, sites, browsers or methods that take long to compile

@@ -8,6 +8,7 @@ import pytest
 from nbclient import NotebookClient
 
 NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
+SHORT = "01-one-rolling-disc", "04-n-to-infinity", "10-discs-with-their-own-heading"  # of every package, run by `make test`
 each = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
 
 
@@ -41,7 +42,7 @@ def test_has_the_form_of_a_lesson(path):
 
 
 @pytest.mark.slow
-@each
+@pytest.mark.parametrize("path", [pytest.param(p, id=p.stem, marks=() if p.stem in SHORT else pytest.mark.long) for p in NOTEBOOKS])
 def test_runs(path):
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(path.parent)}}).execute()

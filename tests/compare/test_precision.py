@@ -30,7 +30,9 @@ SHORT = {
 BOUND = {"IDA, multipliers": 1e-3, "Exudyn, generic": 3e-4, "Exudyn, wheels and beams": 3e-4, "MuJoCo, friction, damped": 3e-2}
 
 
-@pytest.mark.parametrize("name", SHORT)
+@pytest.mark.parametrize(
+    "name", ["uneven", "uneven true", *(pytest.param(name, marks=pytest.mark.long) for name in ("unit", "uneven own"))]
+)
 def test_peers_solve_the_same_problem(name):
     problem: Problem = SHORT[name]
     exact, floor = reference(problem)
