@@ -4,16 +4,18 @@ import argparse
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from discs.chains.stencils import ENDS
-from discs.files.archive import load, named, replacing
+from discs.files.archive import load, named, recorded, replacing
 from discs.files.framefile import FrameFile
 from discs.files.safe import check_writable, fresh
-from discs.files.schema import QUANTITIES, describe
+from discs.files.schema import describe
 from discs.files.untrusted import printable
 from discs.integrators import METHODS
+from discs.mechanics import Trajectory
 from discs.problem import Problem
 from discs.running.frames import WANTS
 from discs.running.step_error import doubts
@@ -118,10 +120,14 @@ def clear_way(options: argparse.Namespace, whole: bool) -> None:
         raise ValueError(f"{path} exists; give --overwrite to replace it")
 
 
-def summary(run: Solution) -> str:
+def summary(run: Solution | Trajectory) -> str:
     """A summary of a run in a few lines."""
-    stats, drift = run.stats, np.abs(run.energy - run.energy[0]).max()
-    what = f"field of the {printable(stats['scene']['name'])} on {run.s.size} nodes" if is_field(run) else f"{run.s.size} discs"
+    stats: Any = run.stats
+    drift = np.abs(run.energy - run.energy[0]).max()
+    if isinstance(run, Trajectory):
+        what = f"mechanical system of the coordinates {printable(', '.join(run.names))}"
+    else:
+        what = f"field of the {printable(stats['scene']['name'])} on {run.s.size} nodes" if is_field(run) else f"{run.s.size} discs"
     lines = [f"{what}, {run.t.size} frames, t = {run.t[0]:g} to {run.t[-1]:g}"]
     if stats.get("frames_missing"):
         lines.append(f"unfinished: {stats['frames_missing']} frames are not there yet")
@@ -130,10 +136,10 @@ def summary(run: Solution) -> str:
     done += [f"{stats['seconds']:.3g} s"] if "seconds" in stats else []
     lines.append(f"method {printable(stats.get('method'))}" + (f": {', '.join(done)}" if done else ""))
     lines.append(f"energy {run.energy[0]:.9g}, changed by {drift:.1e} at most")
-    if run.rolling_residual is not None:
+    if isinstance(run, Solution) and run.rolling_residual is not None:
         lines.append(f"largest slip {run.rolling_residual.max():.1e}")
     lines += [f"not to be trusted: {doubt}" for doubt in doubts(stats)]
-    if run.error_estimate:
+    if isinstance(run, Solution) and run.error_estimate:
         errors = ", ".join(f"{printable(name)} {error:.1e}" for name, error in run.error_estimate.items())
         lines.append(f"estimated error: {errors}")
     return "\n".join(lines)
@@ -147,7 +153,9 @@ def is_field(run: Solution) -> bool:
 def about(path: str | Path) -> str:
     """Description of a file: the run, its parameters, the versions it was made with."""
     run, told = load(path), []
-    if is_field(run):
+    if isinstance(run, Trajectory):
+        told = [f"constraints of {printable(', '.join(run.owners))}"] * bool(run.owners)
+    elif is_field(run):
         told = [f"{printable(name)} = {printable(value)}" for name, value in run.stats["scene"].items()]
     elif run.problem is not None:
         numbers, arrays = describe(run.problem)
@@ -155,8 +163,7 @@ def about(path: str | Path) -> str:
         told += [f"{name}: {value.size} numbers, {value.min():.6g} to {value.max():.6g}" for name, value in arrays.items()]
     with FrameFile.open(path) as file:
         made = ", ".join(f"{printable(name)} {printable(value)}" for name, value in file.attrs["versions"].items())
-    recorded = ", ".join(name for name in QUANTITIES if getattr(run, name) is not None)
-    return "\n".join([summary(run), f"recorded: {recorded}", *told, f"made with {made}"])
+    return "\n".join([summary(run), f"recorded: {', '.join(recorded(run))}", *told, f"made with {made}"])
 
 
 def draw(options: argparse.Namespace) -> None:

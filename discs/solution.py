@@ -23,8 +23,52 @@ if TYPE_CHECKING:
     from discs.pictures.view import View
 
 
+class Result:
+    """Pictures and files of a result: a run, or the motion of a mechanical system.
+
+    t : (F,), times of the frames.
+    """
+
+    t: Float
+
+    @property
+    def discs(self) -> "Solution":
+        """The motion of its discs, which movies and pages show."""
+        raise NotImplementedError
+
+    def plot(self, *panels: str, ax: "Axes | Iterable[Axes] | None" = None) -> "list[Axes]":
+        """Plot standard panels, all or those named; see `discs.pictures.figures.first_look`."""
+        from discs.pictures import figures
+
+        return figures.first_look(self, panels, ax)
+
+    def animate(self, path: str | Path, fps: float = 25, progress: bool = True, **style: Any) -> Path:
+        """Write a movie of the rolling discs, .mp4 or .gif, one picture per frame; see `discs.pictures.animation.animate`."""
+        from discs.pictures.animation import animate
+
+        return animate(self, path, fps, progress, **style)
+
+    def view(self, path: str | Path | None = None, beside: "Result | None" = None, **style: Any) -> "View":
+        """An interactive page with the run in three dimensions, alone or beside another; see `discs.pictures.view.view`."""
+        from discs.pictures.view import view
+
+        return view(self, path, beside, **style)
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a NetCDF-4 file, which `discs.load` reads; see docs/archives.md."""
+        from discs.files import archive
+
+        archive.save(self, path)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """An xarray dataset with dimensions (time, disc) or (time, coordinate), units and long names."""
+        from discs.files import archive
+
+        return archive.to_xarray(self)
+
+
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Result):
     """A motion at F frames of N discs (or of a field on N nodes). Time is the first axis, discs are the last.
 
     `run[10:20]`, `run[::5]` and `run[run.t > 2]` are the same run at fewer frames. `run.state(frame)` is a state to start another
@@ -73,6 +117,11 @@ class Solution:
     modified_energy: Float | None = None
     error_estimate: dict[str, float] | None = None
     problem: Problem | None = None
+
+    @property
+    def discs(self) -> "Solution":
+        """The run itself."""
+        return self
 
     def __repr__(self) -> str:
         frames, n = self.x.shape
@@ -133,38 +182,8 @@ class Solution:
             )
         return State(self.x[i], self.y[i], self.theta[i], self.omega[i], self.phi[i], self.phi_rate[i])
 
-    def plot(self, *panels: str, ax: "Axes | Iterable[Axes] | None" = None) -> "list[Axes]":
-        """Plot standard panels of the run, all or those named; see `discs.pictures.figures.first_look`."""
-        from discs.pictures import figures
-
-        return figures.first_look(self, panels, ax)
-
     def plot_motion(self, ax: "Axes | None" = None, **style: Any) -> "Axes":
         """Plot the centre line and the discs from above at several times; see `discs.pictures.figures.motion`."""
         from discs.pictures import figures
 
         return figures.motion(self, ax, **style)
-
-    def animate(self, path: str | Path, fps: float = 25, progress: bool = True, **style: Any) -> Path:
-        """Write a movie of the rolling discs, .mp4 or .gif, one picture per frame; see `discs.pictures.animation.animate`."""
-        from discs.pictures.animation import animate
-
-        return animate(self, path, fps, progress, **style)
-
-    def view(self, path: str | Path | None = None, beside: "Solution | None" = None, **style: Any) -> "View":
-        """An interactive page with the run in three dimensions, alone or beside another; see `discs.pictures.view.view`."""
-        from discs.pictures.view import view
-
-        return view(self, path, beside, **style)
-
-    def save(self, path: str | Path) -> None:
-        """Write the run to a NetCDF-4 file, which `discs.load` reads; see docs/archives.md."""
-        from discs.files import archive
-
-        archive.save(self, path)
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """The run as an xarray dataset with dimensions (time, disc), units and long names."""
-        from discs.files import archive
-
-        return archive.to_xarray(self)

@@ -14,8 +14,9 @@ import numpy as np
 from discs.arrays import Float
 from discs.files import safe
 from discs.files.framefile import FrameFile, room
-from discs.files.schema import CHECKSUM, COORDINATES, QUANTITIES, attributes, dimensions, frame_checksum, header
-from discs.solution import Solution
+from discs.files.schema import CHECKSUM, COORDINATES, RECORDED, Header, attributes, dimensions, frame_checksum, header
+from discs.mechanics import Trajectory
+from discs.solution import Result, Solution
 
 if TYPE_CHECKING:
     import xarray
@@ -23,16 +24,31 @@ if TYPE_CHECKING:
 SUFFIXES = (".nc", ".nc4", ".h5", ".hdf5")  # of NetCDF-4, which is HDF5
 
 
-def recorded(run: Solution) -> dict[str, Float]:
-    """The recorded arrays of a run, by name."""
-    return {name: np.asarray(value) for name in QUANTITIES if (value := getattr(run, name)) is not None}
+def recorded(run: Result) -> dict[str, Float]:
+    """The recorded arrays of a run, by name; of a mechanical system, also those of its discs."""
+    parts: list[Result] = [run]
+    if isinstance(run, Trajectory) and run.bodies is not None:
+        parts.append(run.discs)
+    rows = {name: np.asarray(getattr(part, name)) for part in parts for name in RECORDED if getattr(part, name, None) is not None}
+    return {name: rows[name] for name in RECORDED if name in rows and rows[name].size}
 
 
-def to_xarray(run: Solution) -> "xarray.Dataset":
-    """A run as an xarray.Dataset, what `xarray.open_dataset` makes of a saved one."""
+def _header(run: Result) -> Header:
+    discs = None if isinstance(run, Trajectory) and run.bodies is None else run.discs
+    problem, s, estimate = (None,) * 3 if discs is None else (discs.problem, discs.s, discs.error_estimate)
+    if not isinstance(run, Trajectory):
+        return header(problem, run.t, s, run.discs.stats, estimate, True)
+    if not (np.diff(run.t) > 0).all():
+        raise ValueError("a file holds frames in order of time; those of this motion go back: integrate it forward from its end")
+    stats: Any = run.stats | (discs.stats if discs else {})
+    return header(problem, run.t, s, stats, None, True, {"names": list(run.names), "owners": list(run.owners)})
+
+
+def to_xarray(run: Result) -> "xarray.Dataset":
+    """A run as an xarray.Dataset, what `xarray.open_dataset` makes of a saved one; names of coordinates and owners are labels."""
     import xarray
 
-    attrs, static = header(run.problem, run.t, run.s, run.stats, run.error_estimate, True)
+    attrs, static = _header(run)
     rows = recorded(run)
     data: dict[str, Any] = {
         name: (dims := dimensions(name), value, {k: v for k, v in attributes(name, dims).items() if k != "coordinates"})
@@ -40,7 +56,9 @@ def to_xarray(run: Solution) -> "xarray.Dataset":
     }
     sums = [frame_checksum({name: value[f] for name, value in rows.items()}) for f in range(run.t.size)]
     data["checksum"] = ("time", np.array(sums, np.int64), {"long_name": CHECKSUM})
-    coords = {name: data.pop(name) for name in COORDINATES}
+    coords = {name: data.pop(name) for name in COORDINATES if name in data}
+    if isinstance(run, Trajectory):
+        coords |= {dim: (dim, list(names)) for dim, names in (("coordinate", run.names), ("constraint", run.owners)) if names}
     return xarray.Dataset(data, coords, attrs)
 
 
@@ -85,24 +103,23 @@ def replacing(path: str | Path) -> Iterator[Path]:
         safe.release(held, done)
 
 
-def save(run: Solution, path: str | Path) -> None:
+def save(run: Result, path: str | Path) -> None:
     """Write a run. At any time the file at `path` is the complete old or the complete new one.
 
     Raises
     ------
     ValueError : if the name does not end as those of NetCDF-4 files do, no file can be made there, a run writes to it, or there is
-        too little room.
+        too little room; if the frames of a mechanical system go back in time.
     """
-    rows = recorded(run)
-    head = header(run.problem, run.t, run.s, run.stats, run.error_estimate, True)
+    rows, head = recorded(run), _header(run)
     shapes = {name: value.shape[1:] for name, value in rows.items()}
     with replacing(path) as real, safe.fresh(real, room(head, shapes)) as new, FrameFile.create(new.name, head, shapes) as file:
         for f in range(run.t.size):
             file.write(f, {name: value[f] for name, value in rows.items()})
 
 
-def load(path: str | Path) -> Solution:
-    """Read a run.
+def load(path: str | Path) -> Solution | Trajectory:
+    """Read a run, or the motion of a mechanical system.
 
     For a run that was interrupted or killed, the solution has the finished frames, and stats["frames_missing"] is the number of the
     others. Arrays of files above 64 MiB are mapped from the file (changes stay in memory).
@@ -112,4 +129,4 @@ def load(path: str | Path) -> Solution:
     ValueError : if the file cannot be read, is not a run, is cut off or damaged, or too large for this machine's memory.
     """
     with FrameFile.open(path) as file:
-        return file.solution()
+        return file.trajectory() if "q" in file else file.solution()

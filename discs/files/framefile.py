@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from discs import checks
 from discs.arrays import Float
 from discs.files import safe, schema, untrusted
-from discs.files.schema import CHECKSUM, COORDINATES, PARAMETERS, QUANTITIES, Header, attributes, dimensions
+from discs.files.schema import CHECKSUM, COORDINATES, MOTION, PARAMETERS, QUANTITIES, RECORDED, Header, attributes, dimensions
+from discs.mechanics import Trajectory
 from discs.problem import Problem
 from discs.solution import Solution
 
@@ -24,7 +25,9 @@ NUMBER, COUNT = np.dtype("<f8"), np.dtype("<i8")
 MAPPED = 64 * 2**20  # bytes; arrays of larger files are memory-mapped, not read
 PART = 2**24  # bytes that are read at once
 DAMAGE = (OSError, KeyError, TypeError, RuntimeError, ValueError, AttributeError, RecursionError, OverflowError)
-NEEDED = ("time", "s", "checksum", "x", "y", "theta", "omega", "energy")
+NEEDED = ("time", "checksum", "energy")
+OF_DISCS = ("s", "x", "y", "theta", "omega")
+OF_SYSTEMS = ("q", "v", "residual")
 
 
 def room(head: Header, shapes: dict[str, tuple[int, ...]]) -> int:
@@ -54,7 +57,7 @@ class FrameFile:
             self._check_shapes()
             self.frames = self.places["time"][1][0]
             # these two must increase, so that wrong sizes are detected before anything else is read
-            self.static = {name: self._increasing(name) for name in COORDINATES}
+            self.static = {name: self._increasing(name) for name in COORDINATES if name in self.places}
             self.static |= {name: self._read(name) for name in self.places if name in PARAMETERS}
             self._check_header()
         except (*DAMAGE, MemoryError) as error:
@@ -101,6 +104,8 @@ class FrameFile:
         """The problem, rebuilt from the file; None if the file has none."""
         told = self.attrs["problem"]
         try:
+            if "q" in self and told is not None:
+                told = told.get("discs")
             if told is None:
                 return None
             if checks.whole("n", told.get("n"), 1) != self.places["s"][1][0]:
@@ -134,7 +139,7 @@ class FrameFile:
     @property
     def recorded(self) -> list[str]:
         """Names of the recorded quantities."""
-        return [name for name in QUANTITIES if name in self.places]
+        return [name for name in RECORDED if name in self.places]
 
     def whole(self, most: int | None = None) -> int:
         """Number of valid frames from the first on, at most `most`."""
@@ -144,16 +149,20 @@ class FrameFile:
                 return f
         return most
 
+    def _count(self) -> int:
+        """Number of valid frames; ValueError if there are none, or too few in a complete file."""
+        count = self.whole()
+        if count < self.frames and self.attrs["complete"]:
+            raise ValueError(f"{self.path} is damaged: frame {count} is not what was written")
+        if not count:
+            raise ValueError(f"{self.path} holds no frame yet")
+        return count
+
     def solution(self, problem: Problem | None = None) -> Solution:
         """The valid frames; ValueError if there are none, or too few in a complete file. The problem is read unless given."""
-        count, missing = self.whole(), {}
-        if count < self.frames:
-            if self.attrs["complete"]:
-                raise ValueError(f"{self.path} is damaged: frame {count} is not what was written")
-            if not count:
-                raise ValueError(f"{self.path} holds no frame yet")
-            missing = {"frames_missing": self.frames - count}
-        rows = {name: self._rows(name, count) for name in self.recorded}
+        count = self._count()
+        missing = {"frames_missing": self.frames - count} if count < self.frames else {}
+        rows = {name: self._rows(name, count) for name in self.recorded if name in QUANTITIES}
         return Solution(
             t=self.static["time"][:count],
             s=self.static["s"],
@@ -162,6 +171,19 @@ class FrameFile:
             problem=problem or self.problem,
             **rows,
         )
+
+    def trajectory(self) -> Trajectory:
+        """The motion of a mechanical system; ValueError as for `solution`."""
+        count, told = self._count(), self.attrs["problem"] or {}
+        rows: dict[str, Any] = {name: self._rows(name, count) for name in (*MOTION, "energy") if name in self}
+        rows.setdefault("multipliers", np.zeros((count, 0)))
+        for name, of in (("names", "q"), ("owners", "multipliers")):
+            given = told.get(name)
+            if not isinstance(given, list) or len(given) != rows[of].shape[1] or not all(isinstance(text, str) for text in given):
+                raise ValueError(f"{self.path} is damaged: {name} must be one text for each of {rows[of].shape[1]} columns of {of}")
+            rows[name] = tuple(given)
+        bodies = self.solution() if "x" in self else None
+        return Trajectory(t=self.static["time"][:count], stats=self.attrs["stats"], bodies=bodies, **rows)
 
     def _write(self, name: str, f: int, value: Float) -> None:
         safe.write_all(self._fd, value.reshape(-1).view(np.uint8).data, self.places[name][0] + f * value.nbytes)
@@ -218,7 +240,7 @@ class FrameFile:
             if "format" not in file.attrs or self._attribute(file, "format") != schema.FORMAT:
                 raise ValueError(f"its attribute 'format' is not {schema.FORMAT!r}")
             self.attrs: dict[str, Any] = {name: self._attribute(file, name) for name in (*untrusted.TEXTS, "complete", "checksum")}
-            for name in (*QUANTITIES, *PARAMETERS, *COORDINATES, "checksum"):
+            for name in (*RECORDED, *PARAMETERS, *COORDINATES, "checksum"):
                 if name not in file:
                     continue
                 if not isinstance(file.get(name, getlink=True), h5py.HardLink) or not isinstance(found := file[name], h5py.Dataset):
@@ -242,17 +264,21 @@ class FrameFile:
 
     def _check_shapes(self) -> None:
         """Check the shapes of the variables, before any is read."""
-        for name in NEEDED:
+        system = "q" in self.places
+        discs = not system or "s" in self.places
+        for name in (*NEEDED, *(OF_DISCS * discs), *(OF_SYSTEMS * system)):
             if name not in self.places:
                 raise ValueError(f"{name} is missing")
-        sizes = {"axis": (2,), "disc": self.places["s"][1], "time": self.places["time"][1]}
+        sizes = {"axis": (2,), "time": self.places["time"][1]}
+        for dim, name in (("disc", "s"), ("coordinate", "q"), ("constraint", "multipliers")):
+            sizes |= {dim: self.places[name][1][-1:]} if name in self.places else {}
         for name, (_, shape) in self.places.items():
             dims = ("time",) if name == "checksum" else dimensions(name)
             need = tuple(sizes.get(d, shape[i : i + 1])[0] for i, d in enumerate(dims))
             if shape != need or not np.prod(shape):
                 raise ValueError(f"{name} has the shape {shape}, not {need}")
-            if shape[-1] > sizes["disc"][0] and dims[-1] in ("link", "bend"):
-                raise ValueError(f"{name} has the shape {shape}, more than one for each of {sizes['disc'][0]} discs")
+            if dims[-1] in ("disc", "link", "bend") and not (discs and shape[-1] <= sizes["disc"][0]):
+                raise ValueError(f"{name} has the shape {shape}, more than one for each of {sizes.get('disc', (0,))[0]} discs")
 
     def _check_header(self) -> None:
         """Check the header and decode its JSON in `attrs`."""

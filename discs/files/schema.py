@@ -48,6 +48,17 @@ QUANTITIES = {
     "modified_energy": Quantity((), "mass length squared per time squared", "invariant of the two-step scheme"),
     "rolling_residual": Quantity((), "length per time", "largest |r. - e omega| over the discs"),
 }
+# of the motion of a mechanical system, whose energy and discs are recorded as those of a run
+MOTION = {
+    "q": Quantity(("coordinate",), "unit of each coordinate", "coordinates"),
+    "v": Quantity(("coordinate",), "unit of each coordinate per time", "velocities"),
+    "multipliers": Quantity(("constraint",), "unit of power per unit of the constraint", "multipliers lambda"),
+    "mu": Quantity(("constraint",), "unit of energy per unit of the constraint", "charges of a vakonomic motion"),
+    "residual": Quantity((), "unit of the constraint", "largest |A v - b|"),
+    "work": Quantity((), "mass length squared per time squared", "work of applied forces"),
+    "reaction_work": Quantity((), "mass length squared per time squared", "work of the reaction of constraints"),
+}
+RECORDED = QUANTITIES | MOTION
 ROD = {
     "density": Quantity(("disc",), "mass per length", "rho"),
     "spin_inertia": Quantity(("disc",), "mass length", "alpha, moment of inertia about the axle per length"),
@@ -118,14 +129,24 @@ def versions() -> dict[str, str]:
 
 
 def header(
-    problem: Problem | None, times: Float, s: Float, stats: Stats, estimate: dict[str, float] | None, complete: bool
+    problem: Problem | None,
+    times: Float,
+    s: Float | None,
+    stats: Stats,
+    estimate: dict[str, float] | None,
+    complete: bool,
+    system: dict[str, Any] | None = None,
 ) -> Header:
-    """The header of a file."""
+    """The header of a file; `system` are the names and owners of a mechanical system, whose discs, if any, are at places s."""
     told, arrays = describe(problem) if problem is not None else (None, {})
-    static = {"time": times, "s": s} | arrays
+    static = {"time": times} | ({} if s is None else {"s": s}) | arrays
+    count = 0 if s is None else s.size
+    title = f"a rod on {count} nodes" if "scene" in stats else f"{count} rolling discs"
+    if system is not None:
+        told, title = {**system, "discs": told}, f"a mechanical system of {len(system['names'])} coordinates"
     attrs: dict[str, str | int] = {
         "format": FORMAT,
-        "title": f"a rod on {s.size} nodes" if "scene" in stats else f"{s.size} rolling discs",
+        "title": title,
         "unit_system": UNITS,
         "problem": as_text(told),
         "method": str(stats.get("method")),
@@ -167,11 +188,11 @@ def fixed(value: str | int) -> np.bytes_ | int:
 
 def attributes(name: str, dims: tuple[str, ...]) -> dict[str, str]:
     """Unit, meaning and place of a variable."""
-    meaning = (QUANTITIES | PARAMETERS | COORDINATES)[name]
+    meaning = (RECORDED | PARAMETERS | COORDINATES)[name]
     place = {"coordinates": "s"} if "disc" in dims and name != "s" else {}
     return {"units": meaning.units, "long_name": meaning.long_name} | place
 
 
 def dimensions(name: str) -> tuple[str, ...]:
     """Dimensions of a variable."""
-    return ("time", *QUANTITIES[name].dims) if name in QUANTITIES else (PARAMETERS | COORDINATES)[name].dims
+    return ("time", *RECORDED[name].dims) if name in RECORDED else (PARAMETERS | COORDINATES)[name].dims

@@ -44,6 +44,7 @@ from numpy.typing import ArrayLike
 from discs import checks
 from discs.arrays import Float, Matrix
 from discs.mechanics import saddle
+from discs.mechanics.bodies import Bodies
 from discs.mechanics.derivatives import Formula
 from discs.mechanics.inputs import Given, function_of, given
 from discs.mechanics.saddle import dense
@@ -74,6 +75,7 @@ class Equations:
     formulas : M(q), V(q), A(q) of `from_lagrangian`; `how` and `error` describe their derivatives.
     applied : t, q, v -> Q, (m,), forces beside those of L; None for none.
     phi : q, v -> phi, (c,), of constraints phi(q, v) = b that are not linear in v; then there is no A(q).
+    bodies : where its discs are, for pictures: `Bodies`, or a function q -> (x, y, theta, phi); None if it has no discs.
     """
 
     names: tuple[str, ...]
@@ -88,6 +90,7 @@ class Equations:
     formulas: tuple[Formula, ...] = ()
     applied: Callable[[float, Float, Float], Any] | None = None
     phi: Callable[[Float, Float], Any] | None = None
+    bodies: Bodies | Callable[[Float], Any] | None = None
 
     def __post_init__(self) -> None:
         names, owners = names_of("names", self.names), names_of("owners", self.owners)
@@ -99,6 +102,8 @@ class Equations:
             parts["applied"] = given("t, q, v", "f", self.applied, m, m)
         if self.phi is not None:
             parts |= {"phi": given("q, v", "phi", self.phi, c, m), "constraint": _not_linear, "constraint_rate": _not_linear}
+        if callable(self.bodies):
+            parts["bodies"] = Bodies(self.bodies)
         for name, value in parts.items():
             object.__setattr__(self, name, value)
 

@@ -69,7 +69,9 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
     last = parts[-1]
     stats = last.stats | {n: sum(p.stats[n] for p in parts) for n in ("steps", "evaluations")}
     stats["rank_drops"] = sorted(moment for p in parts for moment in p.stats["rank_drops"])
-    rows = {name: np.concatenate([getattr(p, name) for p in parts]) for name in FRAMES if getattr(last, name) is not None}
+    rows: dict[str, Any] = {
+        name: np.concatenate([getattr(p, name) for p in parts]) for name in FRAMES if getattr(last, name) is not None
+    }
     rows |= {name: rows[name] - rows[name][0] for name in WORKS if name in rows}
     return replace(last, **rows, stats=stats)
 

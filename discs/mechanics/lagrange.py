@@ -7,6 +7,7 @@ import scipy  # its parts, slow to import, when they are used
 
 from discs.arrays import Float
 from discs.mechanics import MechanicalSystem
+from discs.mechanics.bodies import Bodies
 from discs.problem import Problem
 from discs.solution import Solution
 
@@ -73,6 +74,7 @@ def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSyste
         lambda q, v: rolling(0.0, system.contact_rate(shape(q), v.reshape(rows, n))),
         np.zeros(2 * n),
         symmetry,
+        bodies=Bodies(lambda q: q.reshape(rows, n), problem=problem),
     )
 
 

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
+from discs.mechanics.bodies import Bodies
 from discs.mechanics.drift import Drift
 from discs.mechanics.equations import Equations
 from discs.mechanics.rank_drops import RankDrops
@@ -98,6 +99,8 @@ def integrate(
             f"v must obey the constraints; that of {system.owners[worst]} is off by {off[worst]:.3g}: "
             f"take consistent_velocity(q, v{', t' * system.timed})"
         )
+    if isinstance(system.bodies, Bodies):
+        system.bodies.shape(q)
     system.accelerations(q, v, mu, t[0])  # raises an error of the initial state directly, and examines the derivatives
     rtol = _within_reach(system, rtol)
     found, stats = _follow(system, start, charges.size, t, method, rtol, atol, max_step, progress)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from discs import checks
 from discs.arrays import Float
 from discs.mechanics import motion, saddle
+from discs.mechanics.bodies import Bodies
 from discs.mechanics.derivatives import Formula, ShapeError
 from discs.mechanics.equations import Equations, names_of
 from discs.mechanics.inputs import Given, function_of
@@ -39,6 +40,7 @@ class MechanicalSystem(Equations):
         symmetry: Callable[[Float], ArrayLike] | None = None,
         force: Callable[[float, Float, Float], ArrayLike] | None = None,
         phi: Callable[[Float, Float], ArrayLike] | None = None,
+        bodies: Bodies | Callable[[Float], ArrayLike] | None = None,
     ) -> "MechanicalSystem":
         """A system from M (or M(q)), V(q) and A(q), formulas that take q (m,) and return numbers.
 
@@ -58,6 +60,7 @@ class MechanicalSystem(Equations):
         force : t, q, v -> Q (m,), generalised forces beside those of L, as of dampers and actuators; the attribute `applied`.
         phi : q, v -> phi (c,), instead of A, of constraints phi(q, v) = b that are not linear in v; the reaction is that of
             Chetaev's rule, see `discs.mechanics.equations`.
+        bodies : as the attribute; movies and pages then show the motion.
 
         Raises
         ------
@@ -101,6 +104,7 @@ class MechanicalSystem(Equations):
             (height, *(() if phi else (rows,)), *(() if constant is not None else (inertia,))),
             force,
             phi,
+            bodies,
         )
 
     def also(self, rows: ArrayLike, owners: Sequence[str], drive: Drive = 0.0) -> "MechanicalSystem":

@@ -19,6 +19,7 @@ from scipy.integrate import quad
 from discs import checks
 from discs.arrays import Float
 from discs.mechanics import MechanicalSystem
+from discs.mechanics.bodies import Bodies, blade
 from discs.mechanics.known import Textbook, finite, nonzero, positive
 
 
@@ -74,6 +75,7 @@ def rolling_disc(
         constraint,
         ("disc", "disc"),
         symmetry=symmetry,
+        bodies=Bodies(lambda q: q, r),
     )
     c = r * pull / ((a + m * r**2) * turn)
     b = roll_rate - c * np.cos(heading)
@@ -116,6 +118,7 @@ def knife_edge(mass: float, inertia: float, *, slope: float, speed: float, turn_
         lambda q: [[-np.sin(q[2]), np.cos(q[2]), 0]],
         ("blade",),
         symmetry=lambda q: np.eye(3)[:, 1:],  # along the contour lines, and in phi
+        bodies=blade,
     )
     c = slope / turn
     b = speed - c * np.sin(heading)
@@ -161,7 +164,13 @@ def chaplygin_sleigh(
         return np.array([[1.0, 0.0, -q[1]], [0.0, 1.0, q[0]], [0.0, 0.0, 1.0]])
 
     system = MechanicalSystem.from_lagrangian(
-        ("x", "y", "phi"), metric, lambda q: 0.0, lambda q: [[-np.sin(q[2]), np.cos(q[2]), 0]], ("blade",), symmetry=symmetry
+        ("x", "y", "phi"),
+        metric,
+        lambda q: 0.0,
+        lambda q: [[-np.sin(q[2]), np.cos(q[2]), 0]],
+        ("blade",),
+        symmetry=symmetry,
+        bodies=blade,
     )
     j = inertia + mass * a**2
     top = np.sqrt(speed**2 + j * turn**2 / mass)

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 
 from discs.arrays import Float
+from discs.mechanics.bodies import Bodies
 from discs.mechanics.equations import Equations
+from discs.solution import Result, Solution
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Result):
     """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,).
 
     mu : (F, c), the charges of a vakonomic motion, see `discs.mechanics.vakonomic`; None if it is nonholonomic.
@@ -18,8 +20,11 @@ class Trajectory:
         dependent), and "derivatives": of each formula how they were taken and their largest relative error at the frames.
     work, reaction_work : (F,), work since t[0] of the applied forces and of the reaction of constraints (of drives), with
         energy - energy[0] = work + reaction_work up to the tolerance; None if neither can do work.
+    names, owners : of the m coordinates and the c constraints.
+    bodies : where the system's discs are, or, from a file, their motion; None if it has no discs.
 
-    Multipliers are nan at a moment when rows of A are dependent: they are not determined then.
+    Multipliers are nan at a moment when rows of A are dependent: they are not determined then. `plot` shows coordinates against
+    time; `view` and `animate` need bodies.
     """
 
     t: Float
@@ -32,6 +37,21 @@ class Trajectory:
     stats: dict[str, Any] = field(default_factory=dict)
     work: Float | None = None
     reaction_work: Float | None = None
+    names: tuple[str, ...] = ()
+    owners: tuple[str, ...] = ()
+    bodies: Bodies | Solution | None = None
+
+    @property
+    def discs(self) -> Solution:
+        """The motion of the system's discs as a run; ValueError if it does not say where they are."""
+        if self.bodies is None:
+            raise ValueError(
+                "the system does not say where its discs are: give it bodies, q -> (x, y, theta, phi), or plot its coordinates "
+                "against time by plot()"
+            )
+        if isinstance(self.bodies, Solution):
+            return self.bodies
+        return self.bodies.run(self.t, self.q, self.v, self.energy, self.stats)
 
 
 def at_frames(system: Equations, t: Float, found: Float, charged: bool, stats: dict[str, Any]) -> Trajectory:
@@ -52,4 +72,6 @@ def at_frames(system: Equations, t: Float, found: Float, charged: bool, stats: d
     energy = np.array([system.energy(q, v) for q, v in states])
     off = [np.abs(system.residual(q, v, time)).max(initial=0.0) for time, (q, v) in zip(t, states, strict=True)]
     work, reaction = works.T if works.size else (None, None)
-    return Trajectory(t, path, speed, multipliers, energy, np.array(off), charges if charged else None, stats, work, reaction)
+    bodies = system.bodies if isinstance(system.bodies, Bodies) else None
+    given = (charges if charged else None, stats, work, reaction, system.names, system.owners, bodies)
+    return Trajectory(t, path, speed, multipliers, energy, np.array(off), *given)

@@ -43,6 +43,7 @@ from scipy.linalg import null_space
 from discs import checks
 from discs.arrays import Float
 from discs.mechanics import MechanicalSystem, Trajectory
+from discs.mechanics.bodies import Bodies
 from discs.mechanics.lagrange import frames, lagrange_dalembert
 from discs.mechanics.saddle import dense
 from discs.mechanics.sizes import units
@@ -142,6 +143,7 @@ def rolling_disc(
         constraint,
         constraint_rate,
         np.zeros(2),
+        bodies=Bodies(lambda q: q, radius),
     )
 
 

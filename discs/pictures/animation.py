@@ -22,7 +22,7 @@ from discs import checks
 from discs.arrays import Array, Float
 from discs.pictures import geometry
 from discs.pictures.style import BLUE, GREY, GROUND, INK, ORANGE, PALE
-from discs.solution import Solution
+from discs.solution import Result, Solution
 
 KINDS = (".mp4", ".gif")
 ROUND = np.linspace(0, 2 * np.pi, 33)
@@ -30,7 +30,7 @@ SPOKES = np.arange(4) * np.pi / 2
 
 
 def animate(
-    run: Solution,
+    run: Result,
     path: str | Path,
     fps: float = 25,
     progress: bool = True,
@@ -68,7 +68,7 @@ def animate(
     fps = checks.number("fps", fps, positive=True)
     if size is None:
         size = (1280, 720) if kind == ".mp4" else (800, 450)
-    stage = Stage(run, radius, discs, azimuth, elevation, size)
+    stage = Stage(run.discs, radius, discs, azimuth, elevation, size)
     shown = tqdm(range(run.t.size), desc=path.name, unit="picture", delay=1, disable=not progress)
     partial = path.with_name(f".partial-{path.name}")
     try:

@@ -1,6 +1,7 @@
 """Pictures of the discs. Every function draws into given or new axes and returns them; no window opens."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +12,10 @@ from discs import checks
 from discs.chains.chain import SteeredChain
 from discs.mechanics import Trajectory
 from discs.mechanics.vakonomic import of_chain, rolling_disc, solve
-from discs.pictures import geometry
+from discs.pictures import geometry, trajectories
 from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED
 from discs.problem import Problem, State
-from discs.solution import Solution
+from discs.solution import Result, Solution
 
 
 def given_or_new(ax: Axes | None, width: float, height: float) -> Axes:
@@ -22,21 +23,22 @@ def given_or_new(ax: Axes | None, width: float, height: float) -> Axes:
     return Figure(figsize=(width, height), layout="constrained").subplots() if ax is None else ax
 
 
-def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Axes] | None = None) -> list[Axes]:
-    """Standard panels of a run: the named ones, or all of `PANELS`.
+def first_look(run: Result, panels: Iterable[str] = (), ax: Axes | Iterable[Axes] | None = None) -> list[Axes]:
+    """Standard panels of a run, or of the motion of a mechanical system: the named ones, or all.
 
     Parameters
     ----------
     panels : "motion" (from above), "theta" and "omega" over (s, t), "end" (the first disc against time), "profiles" (theta along
-        the rod), "energy" (its error). One disc has no theta, omega and profiles along s.
+        the rod), "energy" (its error). One disc has no theta, omega and profiles along s. Of a mechanical system: "coordinates",
+        "velocities", "multipliers", "energy" (its change, and works) against time, "above" (paths in the plane).
     ax : one axes for each panel, or None for a new figure.
 
     Raises
     ------
     ValueError : for an unknown panel, another number of axes, or a run of a single frame.
     """
-    every = [name for name in PANELS if run.s.size > 1 or name not in ALONG]
-    names = [checks.choice("panel", name, every) for name in panels] or every
+    every = _panels(run)
+    names = [checks.choice("panel", name, every) for name in panels] or list(every)
     if ax is None:
         columns = min(len(names), 3)
         rows = -(-len(names) // columns)
@@ -49,8 +51,16 @@ def first_look(run: Solution, panels: Iterable[str] = (), ax: Axes | Iterable[Ax
     if run.t.size < 2:
         raise ValueError("a picture over time needs at least two frames; got 1")
     for name, one in zip(names, axes, strict=True):
-        PANELS[name](run, one)
+        every[name](one)
     return axes
+
+
+def _panels(run: Result) -> dict[str, Callable[[Axes], Axes]]:
+    """The panels of a result, by name."""
+    if isinstance(run, Trajectory):
+        return {name: partial(draw, run) for name, draw in trajectories.panels(run).items()}
+    one = run.discs
+    return {name: partial(draw, one) for name, draw in PANELS.items() if one.s.size > 1 or name not in ALONG}
 
 
 def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 9, radius: float | None = None) -> Axes:

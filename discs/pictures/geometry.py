@@ -5,6 +5,7 @@ for discs with own headings and r'/|r'| for the others; it rolls along J d_1 (th
 r. = R omega J d_1). The spoke that points up at theta = 0 is the paper's director d_3 = cos(theta) e_z + sin(theta) J d_1.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from discs import checks
 from discs.arrays import Float, Int
 from discs.chains.rolling import ROLLING
 from discs.mechanics import Trajectory
-from discs.running.stats import Stats
+from discs.mechanics.bodies import Bodies
 from discs.solution import Solution
 
 TOO_FAR = 0.2  # of the drawn radius: largest error of a point of a rim between two frames
@@ -89,10 +90,8 @@ def one_disc(path: Trajectory, radius: float) -> Solution:
     """The motion of a single disc, coordinates (x, y, theta, phi) as of `textbook.rolling_disc`, as a run for pictures."""
     if path.q.shape[1] != 4:
         raise ValueError(f"one disc has the coordinates x, y, theta, phi; got {path.q.shape[1]} of them")
-    named = dict(zip(("x", "y", "theta", "phi"), path.q.T[..., None], strict=True))
-    rates = dict(zip(("x_rate", "y_rate", "omega", "phi_rate"), path.v.T[..., None], strict=True))
-    stats: Stats = {"method": "textbook", "radius": checks.number("radius", radius, positive=True)}
-    return Solution(t=path.t, s=np.zeros(1), **named, **rates, energy=path.energy, stats=stats)
+    bodies = Bodies(lambda q: q, checks.number("radius", radius, positive=True))
+    return replace(path, bodies=bodies, stats={"method": "textbook"}).discs
 
 
 def _radius(run: Solution) -> float | None:

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from discs import checks
 from discs.pictures import geometry
 from discs.pictures.style import BLUE, GREY, GROUND, INK, LABEL, ORANGE, SIGNED, UNSIGNED
-from discs.solution import Solution
+from discs.solution import Result, Solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +58,9 @@ class View:
 
 
 def view(
-    run: Solution,
+    run: Result,
     path: str | Path | None = None,
-    beside: Solution | None = None,
+    beside: Result | None = None,
     titles: Sequence[str] = (),
     radius: float | None = None,
     discs: int = 65,
@@ -83,17 +83,17 @@ def view(
     ValueError : if `beside` is not a Solution; for a wrong number of titles, a folder that does not exist, another kind of file,
         values that are not finite, or one disc without a heading.
     """
-    if beside is not None and not isinstance(beside, Solution):
+    if beside is not None and not isinstance(beside, Result):
         raise ValueError(f"beside must be another Solution; got {type(beside).__name__}")
     if path is not None:
         checks.choice("the page's ending", Path(path).suffix.lower(), (".html",))
-    runs = [run] if beside is None else [run, beside]
+    runs = [r.discs for r in (run, beside) if r is not None]
     if isinstance(titles, str) or not all(isinstance(title, str) for title in titles):
         raise ValueError(f"titles must be a list of strings, one for each run; got {titles!r}")
     titles = list(titles) or [_title(r) for r in runs]
     if len(titles) != len(runs):
         raise ValueError(f"titles must be one for each of the {len(runs)} runs; got {len(titles)}")
-    size = geometry.drawn_radius(run, radius)
+    size = geometry.drawn_radius(runs[0], radius)
     about = checks.whole("discs", discs, 2)
     data = {
         "runs": [_data(r, title, about, size) for r, title in zip(runs, titles, strict=True)],
