@@ -22,13 +22,13 @@ def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSyste
     Symmetries are the motions of the plane (those that a shifted ring allows) and an equal roll of all discs of a piece. A piece is
     a set of discs joined by torsion springs.
 
-    M and A are sparse arrays or, with `dense`, NumPy arrays, which are faster for a few discs. Loads are refused:
-    they may depend on time, which these equations do not.
+    M and A are sparse arrays or, with `dense`, NumPy arrays, which are faster for a few discs. Loads are
+    refused, as they are parts of a run: give the system their forces as `applied`.
     """
     if problem.loads:
         raise ValueError(
-            "lagrange_dalembert takes a problem without loads; got some: take replace(problem, loads=()), and add their "
-            "forces f(q, v) to those of the system"
+            "lagrange_dalembert takes a problem without loads; got some: take replace(problem, loads=()), and give "
+            "the system their forces, replace(system, applied=f) with f(t, q, v)"
         )
     system, n = problem.system, problem.chain.n
     rows, m = len(system.rows), len(system.rows) * n

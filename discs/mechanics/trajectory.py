@@ -41,6 +41,15 @@ class Trajectory(Result):
     owners: tuple[str, ...] = ()
     bodies: Bodies | Solution | None = None
 
+    def __repr__(self) -> str:
+        frames, m = self.q.shape
+        done = None if self.work is None or self.reaction_work is None else self.work + self.reaction_work
+        off = np.abs(self.energy - self.energy[0] - (0.0 if done is None else done)).max()
+        return (
+            f"Trajectory({frames} frames of {m} coordinates, t = {self.t[0]:g} to {self.t[-1]:g}, method "
+            f"{self.stats.get('method')!r}, energy {self.energy[0]:.6g}{'' if done is None else ' and works'} to within {off:.1e})"
+        )
+
     @property
     def discs(self) -> Solution:
         """The motion of the system's discs as a run; ValueError if it does not say where they are."""

@@ -286,6 +286,32 @@ def test_forces_and_drives_agree_with_the_reduced_form():
     assert saddle.acceleration[2] == pytest.approx(np.cos(t) + v[0], abs=1e-14)
 
 
+def test_a_vakonomic_drive():
+    """y. = sin x + t: the action of L + mu (y. - sin x - t), Euler-Lagrange x.. = -mu cos x and y. + mu = const."""
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y"), np.eye(2), lambda q: 0.0, lambda q: [[0, 1]], "rail", lambda t, q: np.sin(q[0]) + t
+    )
+    path = system.integrate([0.3, 0], [0.8, np.sin(0.3)], TIMES, mu=[0.4], progress=False)
+    whole = np.sin(0.3) + 0.4
+
+    def motion(t, z):
+        return [z[1], -(whole - np.sin(z[0]) - t) * np.cos(z[0])]
+
+    known = solve_ivp(motion, (0, 4), [0.3, 0.8], "DOP853", TIMES, rtol=1e-12, atol=1e-12).y
+    np.testing.assert_allclose(path.q[:, 0], known[0], atol=1e-9)
+    np.testing.assert_allclose(path.v[:, 1], np.sin(known[0]) + TIMES, atol=1e-9)
+    np.testing.assert_allclose(path.mu[:, 0] + path.v[:, 1], whole, atol=1e-9)
+    assert balance(path) < 1e-9
+
+
+@pytest.mark.parametrize("method", ["RK45", "Radau", "BDF", "LSODA"])
+def test_every_method_takes_drives(method):
+    book = BOOKS["ball on a turntable"]
+    path = book.integrate([0, 1.0, 2.0], 1e-7, method=method, progress=False)
+    np.testing.assert_allclose(path.q[-1], book.exact(2.0)[0], atol=1e-4)
+    assert balance(path) < 1e-4
+
+
 def test_momenta_count_applied_forces():
     book = textbook.rolling_disc(1.3, 0.6, 0.4, 0.7, roll_rate=1.1, turn_rate=0.8)
     system = replace(book.system, applied=lambda t, q, v: [0.3 * np.sin(t), 0, -0.2 * v[2], 0.1])

@@ -98,6 +98,13 @@ def test_places_of_a_wrong_shape_are_refused_before_the_run(bodies, shape):
         system.integrate(np.zeros(4), np.zeros(4), TIMES)
 
 
+def test_in_one_line():
+    path = ball()
+    told = repr(replace(path, work=path.work + 0.25))
+    assert told.startswith("Trajectory(5 frames of 5 coordinates, t = 0 to 1, method 'DOP853', energy ")
+    assert told.endswith(" and works to within 2.5e-01)")
+
+
 # Pictures
 
 
