@@ -13,7 +13,7 @@ from discs.chains.rolling import stretching
 from discs.chains.rolling_discs import RollingDiscs
 from discs.chains.slaved import SlavedSystem
 from discs.chains.steered import SteeredSystem
-from discs.loads import total
+from discs.loads import Linear, OnRod, signals, total
 from discs.skew import Load, Phase
 
 
@@ -54,7 +54,7 @@ class Problem:
     initial : state at t = 0.
     duration : time to simulate, > 0.
     loads : forces besides those of springs and ground, see `discs.loads`; they are added. Their potentials are part of the energy.
-        If a load has none, as a damper, energy is not conserved, and no warning compares it.
+        If a load has none, as a damper, energy is balanced by `Solution.work` and `Solution.dissipated`.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class Problem:
     chain: Chain | SteeredChain
     initial: State
     duration: float
-    loads: tuple[Load, ...] = ()
+    loads: tuple[Load | OnRod, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
@@ -87,16 +87,25 @@ class Problem:
         return Problem, (self.chain, self.initial, self.duration, self.loads)
 
     def _check_loads(self) -> None:
-        if not isinstance(self.loads, tuple) or not all(isinstance(load, Load) for load in self.loads):
-            raise ValueError(f"loads must be a tuple of loads, as (Linear(...),); got {self.loads!r}")
+        if not isinstance(self.loads, tuple) or not all(isinstance(load, Load | OnRod) for load in self.loads):
+            raise ValueError(f"loads must be a tuple of loads, as (Torque(...),); got {checks.shown(self.loads)}")
         system = SlavedSystem if isinstance(self.chain, Chain) else SteeredSystem
         shape = len(system.rows), self.chain.n
-        for load in self.loads:
+        for load in self.bound:
             if np.shape(load.damping) != shape or np.shape(load.stiffness) != shape:
                 raise ValueError(
                     f"{type(load).__name__}: damping and stiffness must have shape {shape}, a row for each coordinate and a column "
                     f"for each disc; got {np.shape(load.damping)} and {np.shape(load.stiffness)}"
                 )
+            if isinstance(load, Linear):
+                for drive in load.drives:
+                    signals.values(drive.signal, np.array([0.0, self.duration]), drive.name)
+                continue
+            q = self._positions()
+            force = np.asarray(load.force(0.0, q, np.zeros(shape)), dtype=float)
+            if force.shape != shape or not np.isfinite(force).all():
+                got = f"shape {force.shape}" if force.shape != shape else "values that are not finite"
+                raise ValueError(f"{type(load).__name__}: the force must be finite numbers of shape {shape}; got {got} at t = 0")
 
     def _check_slopes(self, chain: Chain) -> None:
         shape = self.system.shape(self._positions())
@@ -117,9 +126,14 @@ class Problem:
             raise ValueError(f"spin_inertia must be positive where {where}, as at disc {i}; got 0")
 
     @cached_property
+    def bound(self) -> tuple[Load, ...]:
+        """The loads for the discs of the chain."""
+        return tuple(load.on(self.chain) if isinstance(load, OnRod) else load for load in self.loads)
+
+    @cached_property
     def system(self) -> RollingDiscs:
         """The equations of motion."""
-        load = total(self.loads)
+        load = total(self.bound)
         return SteeredSystem(self.chain, load) if isinstance(self.chain, SteeredChain) else SlavedSystem(self.chain, load)
 
     def _positions(self) -> Float:
@@ -183,4 +197,4 @@ class Problem:
     def _energy(self) -> float:
         z, system = self.start(), self.system
         energy = 0.5 * float(np.vdot(z.pi, z.pi)) + system.potential(system.shape(z.hi, z.lo))
-        return energy if system.load is None else energy + system.load.potential(z.hi + z.lo)
+        return energy if system.load is None else energy + system.load.potential(0.0, z.hi + z.lo)

@@ -94,7 +94,7 @@ def simulate(
 def doubted(problem: Problem, run: Solution) -> str:
     """The warning for a run that may not be trusted; empty if there is none."""
     method = run.stats["method"]
-    said = lost_energy(problem, method, run.t, run.energy, run)
+    said = lost_energy(problem, method, run.t, run.energy, run) if run.balance is None else lost_balance(problem, method, run)
     stats = run.stats
     doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # first, as it is cheap and most runs pass
     if doubtful and (reasons := doubts(stats)):
@@ -139,6 +139,19 @@ def _search(
     return found, doubt
 
 
+def lost_balance(problem: Problem, method: str, run: Solution) -> str:
+    """The warning if energy - work + dissipated of a run drifts by more than ENERGY_DRIFT_WARNING of the largest of them."""
+    terms = np.stack([run.energy, run.work, run.dissipated])
+    off = np.abs(run.energy - problem.energy() - run.work + run.dissipated)
+    worst = int(off.argmax())
+    if off[worst] <= ENERGY_DRIFT_WARNING * np.abs(terms).max():
+        return ""
+    return (
+        f"{method}: the change of energy is work less what dampers took, but at t = {run.t[worst]:g} it is off by "
+        f'{off[worst]:.3g}: the run may not be trusted; take a smaller dt, or "midpoint"'
+    )
+
+
 def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Solution | None = None) -> str:
     """The warning if energies (F,) at times (F,) drift from the initial one by more than ENERGY_DRIFT_WARNING; else empty.
 
@@ -149,7 +162,7 @@ def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Sol
     worst, most, load = int(off.argmax()), problem.blown_up / 10, problem.system.load
     if load is not None and load.conservative and most == np.inf and run is not None:
         paths = np.stack([getattr(run, row) for row in problem.system.rows], axis=1)
-        most = max(float(e) - load.potential(q) for e, q in zip(energy, paths, strict=True))
+        most = max(float(e) - load.potential(time, q) for time, e, q in zip(t, energy, paths, strict=True))
     if off[worst] <= ENERGY_DRIFT_WARNING * most:
         return ""
     return (

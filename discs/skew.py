@@ -65,6 +65,8 @@ class Load(ABC):
     ----------
     damping, stiffness : (rows, n), minus the derivatives of f by v and by q, of its linear part that acts disc by disc. Implicit
         steps add them to their matrix. `force` is the whole of f, these parts included.
+    viscosity : (columns, n + 1), of the part -B^T (viscosity) B v of f in the rows from theta on, where B v is the difference of
+        neighbours. Link j is before disc j; on a ring links 0 and n are the same, at free ends they have 0. None for none.
     conservative : whether f = -grad U with U = `potential`; then the energy, U included, is conserved.
     least : a lower bound of U, used to detect blow-up; -inf if none is known.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
@@ -72,12 +74,21 @@ class Load(ABC):
 
     damping: Float
     stiffness: Float
+    viscosity: Float | None = None
     conservative: bool = False
     least: float = -np.inf
 
-    def potential(self, q: Float) -> float:
-        """U, the load's part of the energy, at positions (rows, n); 0 where it has none."""
+    def potential(self, t: float, q: Float) -> float:
+        """U, the load's part of the energy, at the time t and positions (rows, n); 0 where it has none."""
         return 0.0
+
+    def driven(self, t: float, q: Float) -> float:
+        """The part of U that depends on time explicitly; `power` has the work of its forces, so its change is work too."""
+        return 0.0
+
+    def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
+        """The rates of work and of dissipation, both outside of U; by default all that f does, or nothing if f = -grad U."""
+        return (0.0 if self.conservative else float(np.vdot(v, self.force(t, q, v)))), 0.0
 
     @abstractmethod
     def force(self, t: float, q: Float, v: Float) -> Float:
@@ -86,6 +97,10 @@ class Load(ABC):
     @property
     def parameters(self) -> Parameters:
         return None
+
+    def timed(self, times: Float, h: float) -> Parameters:
+        """New `parameters` for compiled steps of size h, whose forces are evaluated at these times, (m,)."""
+        return self.parameters
 
 
 class SkewGradient(ABC):

@@ -92,6 +92,10 @@ class Solution(Result):
     contact_force : (F, 2, N), force (x, y) of the ground that keeps each disc rolling, the multiplier lambda, mass times length
         per time squared; want "contact_force".
     tension : (F, n_links), the multiplier p in the links of a free rod, force; of `continuum.free_rod`.
+    work, dissipated : (F,), work of loads that are not part of the energy, and energy that dampers took, both since the start:
+        energy - energy[0] = work - dissipated, to rounding for "midpoint", its compositions and the Gauss methods if V is
+        quadratic, otherwise to the order of the method. Zeros without loads.
+    balance : (F, 2), work and dissipated, as recorded; None if all loads are part of the energy.
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
     problem : the problem of discs; of a field by "richardson", the one on the finest mesh; otherwise None.
     error_estimate : estimated largest error over discs (or nodes) and frames, by quantity; None if it was not estimated.
@@ -115,6 +119,7 @@ class Solution(Result):
     contact_force: Float | None = None
     tension: Float | None = None
     modified_energy: Float | None = None
+    balance: Float | None = None
     error_estimate: dict[str, float] | None = None
     problem: Problem | None = None
 
@@ -123,12 +128,24 @@ class Solution(Result):
         """The run itself."""
         return self
 
+    @property
+    def work(self) -> Float:
+        """Work of the loads that are not part of the energy, since the start, (F,)."""
+        return np.zeros(self.t.size) if self.balance is None else self.balance[:, 0]
+
+    @property
+    def dissipated(self) -> Float:
+        """Energy that dampers took since the start, (F,)."""
+        return np.zeros(self.t.size) if self.balance is None else self.balance[:, 1]
+
     def __repr__(self) -> str:
         frames, n = self.x.shape
-        drift = np.abs(self.energy - self.energy[0]).max()
+        off = self.energy - self.work + self.dissipated
+        drift = np.abs(off - off[0]).max()
+        kept = "energy" if self.balance is None else "energy - work + dissipated"
         return (
             f"Solution({frames} frames of {n} discs, t = {self.t[0]:g} to {self.t[-1]:g}, "
-            f"method {self.stats.get('method')!r}, energy {self.energy[0]:.6g} to within {drift:.1e}"
+            f"method {self.stats.get('method')!r}, {kept} {off[0]:.6g} to within {drift:.1e}"
             f"{''.join(f'; {doubt}' for doubt in doubts(self.stats))})"
         )
 

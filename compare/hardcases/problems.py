@@ -163,7 +163,7 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
         off = v - system.forward(c, system.back(c, system.weights * v))
         share = max(share, float(np.sqrt(system.kinetic(off) / problem.energy())))
         onset = t if np.isnan(onset) and share > 0.1 else onset
-        energy.append(run.observe(run.frame(0.0))["energy"])
+        energy.append(run.observe(t, run.frame(0.0))["energy"])
         if processor() - begun > seconds:
             return Found("cut off", t, h, steps=run.step, seconds=processor() - begun)
     drift = float(np.abs(np.array(energy) / problem.energy() - 1).max())

@@ -39,6 +39,12 @@ class Spaced:
         return s
 
     @property
+    def middles(self) -> Float:
+        """Places of the middles of links along the rod, (n_links,)."""
+        middles: Float = self.k * (0.5 + np.arange(self.n - (self.ends != "ring"), dtype=float))
+        return middles
+
+    @property
     def w(self) -> Float:
         """Share of the length of each disc, (n,)."""
         return stencils.shares(self.n, self.k, self.ends)

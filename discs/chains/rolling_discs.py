@@ -110,6 +110,10 @@ class RollingDiscs(SkewGradient):
             guide = self.back(c, (d * self.load.damping + g * self.load.stiffness) * c).ravel()
             matrix = matrix.astype(np.result_type(matrix, guide))
             matrix[-1] += guide if self.order is None else guide[self.order]
+            if self.load.viscosity is not None:
+                viscous = d * self._viscous(self.load.viscosity, c)
+                matrix = matrix.astype(np.result_type(matrix, viscous))
+                matrix[-len(viscous) :] += viscous
         rhs = rhs.astype(matrix.dtype)
         flat = rhs.ravel() if self.order is None else rhs.ravel()[self.order]
         if np.iscomplexobj(matrix):
@@ -126,6 +130,21 @@ class RollingDiscs(SkewGradient):
             p = p[self._inverse_order]
         found: Float = p.reshape(rhs.shape)
         return found
+
+    def _viscous(self, viscosity: Float, c: Float) -> Float:
+        """Upper bands of C^T B^T (viscosity) B C."""
+        first = np.arange(self.n - (not self.closed))
+        second = (first + 1) % self.n
+        strains = [np.stack([-a[first], a[second]], axis=1)[:, None, :] for a in c[2:]]
+        return self._neighbours(*zip(strains, viscosity[:, 1 : 1 + first.size, None], strict=True))
+
+    @cached_property
+    def _neighbours(self) -> "Assembly":
+        """For strains that join the rolls, or the turns, of neighbours."""
+        first = np.arange(self.n - (not self.closed))
+        place = np.arange(self.n) if self._inverse_order is None else self._inverse_order
+        pairs = np.stack([first, (first + 1) % self.n], axis=1)
+        return Assembly(*(place[pairs + column * self.n] for column in range(len(self.rows) - 2)))
 
 
 class Assembly:

@@ -269,7 +269,7 @@ class FrameFile:
         for name in (*NEEDED, *(OF_DISCS * discs), *(OF_SYSTEMS * system)):
             if name not in self.places:
                 raise ValueError(f"{name} is missing")
-        sizes = {"axis": (2,), "time": self.places["time"][1]}
+        sizes = {"axis": (2,), "part": (2,), "time": self.places["time"][1]}
         for dim, name in (("disc", "s"), ("coordinate", "q"), ("constraint", "multipliers")):
             sizes |= {dim: self.places[name][1][-1:]} if name in self.places else {}
         for name, (_, shape) in self.places.items():

@@ -45,6 +45,7 @@ QUANTITIES = {
     "contact_force": Quantity(("axis", "disc"), "mass length per time squared", "force of the ground on each disc"),
     "tension": Quantity(("link",), "mass length per time squared", "tension of the links"),
     "energy": Quantity((), "mass length squared per time squared", "kinetic and potential energy"),
+    "balance": Quantity(("part",), "mass length squared per time squared", "work of loads, energy that dampers took"),
     "modified_energy": Quantity((), "mass length squared per time squared", "invariant of the two-step scheme"),
     "rolling_residual": Quantity((), "length per time", "largest |r. - e omega| over the discs"),
 }

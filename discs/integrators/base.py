@@ -2,7 +2,7 @@
 
 import signal
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, TypeAlias, final
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from discs.arrays import Float, Int
 from discs.chains.rolling_discs import RollingDiscs
-from discs.skew import Parameters, Phase
+from discs.skew import Load, Parameters, Phase, add
 
 
 @dataclass
@@ -22,17 +22,35 @@ class Work:
     gradients : evaluations of grad V.
     solves : banded linear systems.
     unconverged : implicit steps that reached their limit of sweeps.
+    spent : (4,), the work of loads and the energy that they dissipate, each with its lost digits.
     """
 
     gradients: int = 0
     solves: int = 0
     unconverged: int = 0
+    spent: Float = field(default_factory=lambda: np.zeros(4))
 
     def add(self, tally: "Tally") -> None:
         """Add the cost of compiled steps."""
         self.gradients += tally.gradients
         self.solves += tally.solves
         self.unconverged += tally.unconverged
+        if tally.spent is not NOTHING:
+            self.book(tally.spent[0], tally.spent[2])
+
+    def book(self, work: float, dissipated: float) -> None:
+        """Add the work of loads and the energy that they dissipate."""
+        total, lost = add(self.spent[::2], self.spent[1::2], np.array([work, dissipated]))
+        self.spent = np.array([total[0], lost[0], total[1], lost[1]])
+
+    def spend(self, load: Load | None, t: float, weight: float, z: Phase, move: Float, v: Float) -> None:
+        """Book what a load does in a time `weight` around t, at the positions of z after a move, with velocities v (rows, n)."""
+        if load is not None and not load.conservative:
+            work, dissipated = load.power(t, z.hi + (z.lo + move), v)
+            self.book(weight * work, weight * dissipated)
+
+
+NOTHING = np.zeros(4)  # spent by a run without loads
 
 
 class Tally(NamedTuple):
@@ -40,6 +58,7 @@ class Tally(NamedTuple):
 
     steps, gradients, solves, unconverged : steps taken, and their cost. lost : a disc that lost its heading, or -1.
     passed : looks done. doubted : whether a step to be compared comes next. blown : whether the kinetic energy exceeds the bound.
+    spent : (4,), as in `Work`.
     """
 
     steps: int
@@ -50,6 +69,7 @@ class Tally(NamedTuple):
     passed: int
     doubted: bool
     blown: bool
+    spent: Float = NOTHING
 
 
 Memory: TypeAlias = Any  # a NamedTuple or an object: all that a method needs between steps, of a type of its own
@@ -66,6 +86,7 @@ class Frame(NamedTuple):
 
     lost : a disc that lost its heading in the compiled step to the frame, or -1. If there is one, the rest is undefined.
     seen : q, energy and largest slip, if the compiled form computed them.
+    spent : (2,), work of loads and dissipated energy since the last step.
     """
 
     hi: Float
@@ -73,6 +94,7 @@ class Frame(NamedTuple):
     rate: Float
     lost: int = -1
     seen: tuple[Float, float, float] | None = None
+    spent: Float = NOTHING[:2]
 
 
 class Integrator(ABC):
@@ -182,7 +204,15 @@ class FixedStep(Integrator):
 
     @final
     def march(
-        self, chain: Parameters, memory: Memory, t: float, h: float, steps: int, bound: float, looks: Looks = NO_LOOKS
+        self,
+        system: RollingDiscs,
+        chain: Parameters,
+        memory: Memory,
+        t: float,
+        h: float,
+        steps: int,
+        bound: float,
+        looks: Looks = NO_LOOKS,
     ) -> tuple[Memory, Tally]:
         """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.parameters`.
 
@@ -191,8 +221,15 @@ class FixedStep(Integrator):
         """
         import discs.kernels.driver as driver
 
+        if system.load is not None:
+            starts = t + h * np.arange(steps + 1.0)
+            times = np.add.outer(starts, h * np.array([0.0, *self.parameters.nodes]))
+            chain = chain._replace(load=system.load.timed(times.ravel(), abs(h)))
         state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta (n,) are (1, n) in compiled code
-        tally = Tally(*driver.march(self.parameters, chain, state, t, h, steps, bound, *looks))
+        found = driver.march(self.parameters, chain, state, t, h, steps, bound, *looks)
+        tally = Tally(*found)
+        if system.load is not None and not system.load.conservative:
+            tally = tally._replace(spent=chain.load.spent)
         if tally.steps < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut
@@ -218,24 +255,26 @@ class OneStep(FixedStep):
     def at(
         self, system: RollingDiscs, memory: Phase, t: float, tau: float, h: float, work: Work, chain: Parameters = None
     ) -> Frame:
+        z, lost, before = memory, -1, work.spent
         if chain is None:
             z = self.step(system, memory, t, tau, work) if tau else memory
-            return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi))
+            spent, work.spent = (work.spent - before)[::2], before
+            return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi), spent=spent)
         import discs.kernels.driver as driver
 
-        z, lost = memory, -1
+        spent = NOTHING[::2]
         if tau:
-            z, tally = self.march(chain, memory, t, tau, 1, np.inf)
-            work.add(tally)
-            lost = tally.lost
+            z, tally = self.march(system, chain, memory, t, tau, 1, np.inf)
+            work.add(tally._replace(spent=NOTHING))
+            lost, spent = tally.lost, tally.spent[::2]
         rate, q = np.empty(z.hi.shape), np.empty(z.hi.shape)
         energy, slip = driver.look(chain, z if z.pi.ndim == 2 else Phase(z.hi, z.lo, z.pi[None]), rate, q)
-        return Frame(z.hi, z.lo, rate, lost, (q, energy, slip))
+        return Frame(z.hi, z.lo, rate, lost, (q, energy, slip), spent)
 
     @final
     def finer(self, system: RollingDiscs, memory: Phase, t: float, h: float, chain: Parameters = None) -> Float:
         if chain is not None:
-            z: Phase = self.march(chain, memory, t, 0.5 * h, 2, np.inf)[0]
+            z: Phase = self.march(system, chain, memory, t, 0.5 * h, 2, np.inf)[0]
             return z.hi
         work = Work()
         return self.step(system, self.step(system, memory, t, 0.5 * h, work), t + 0.5 * h, 0.5 * h, work).hi

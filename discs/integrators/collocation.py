@@ -59,6 +59,11 @@ class Collocation(NamedTuple):
     sweeps: int
     tolerance: float
 
+    @property
+    def nodes(self) -> Float:
+        """Times of the forces in a step, in units of h."""
+        return self.tableau.nodes
+
 
 class Room(NamedTuple):
     """Workspace. times : (s,). moves, v : (s, rows, n). p, rest, force (later the change of p) : (s, columns, n).
@@ -228,6 +233,8 @@ def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Ph
         do.forwards(chain, work, c, p, v)
         moved = do.moved(chain, method, room, sweep, h)
         sweep += 1
+    for i in range(s):
+        do.spend(chain, times[i], h * rule.b[i], v[i], 1.0)
     move = moves[0]
     combine(rule.b, v, h, move)
     advance(before, move, 1.0, after)

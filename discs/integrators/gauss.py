@@ -118,7 +118,9 @@ class Gauss(OneStep, ABC):
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         rule = tableau(self.stages)
-        after, _, _, sweep = collocate(system, z, t, h, rule, Common(system, z, h), self.sweeps, self.tolerance)
+        after, v, _, sweep = collocate(system, z, t, h, rule, Common(system, z, h), self.sweeps, self.tolerance)
+        for node, b, move, rate in zip(rule.nodes, rule.b, h * _mix(rule.a, v), v, strict=True):
+            work.spend(system.load, t + node * h, b * h, z, move, rate)
         work.gradients += sweep * self.stages
         work.solves += sweep * (rule.real.size + rule.pairs.size)
         work.unconverged += sweep == self.sweeps and self.tolerance > 0

@@ -11,9 +11,11 @@ from discs import checks
 from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
-from discs.integrators.base import Frame, Integrator, Work
+from discs.integrators.base import NOTHING, Frame, Integrator, Work
 from discs.kernels.shared import columns
 from discs.skew import Parameters, Phase
+
+NODES = np.polynomial.legendre.leggauss(5)
 
 
 class Reduced:
@@ -45,8 +47,10 @@ class Reduced:
         if self.chain is not None:
             import discs.kernels.driver as driver
 
-            out = np.empty_like(y)
-            driver.reduced(self.chain, t, np.ascontiguousarray(y), out)
+            out, chain, load = np.empty_like(y), self.chain, self.system.load
+            if load is not None:
+                chain = chain._replace(load=load.timed(np.array([t]), 1.0))
+            driver.reduced(chain, t, np.ascontiguousarray(y), out)
             return out
         z = self.split(y)
         shape = self.system.shape(z.hi)
@@ -108,7 +112,7 @@ class SolveIvp(Integrator, ABC):
         if hasattr(solver, "lu"):
             make = solver.lu
             solver.lu = lambda matrix: solvers.Factors(matrix, make)
-        return Course(f, solver, 0.0, z)
+        return Course(f, solver, 0.0, z, np.zeros(2))
 
     def advance(self, system: RollingDiscs, memory: "Course", t: float, h: float, work: Work) -> "Course":
         return memory.to(memory.time + h, work)
@@ -117,36 +121,64 @@ class SolveIvp(Integrator, ABC):
         self, system: RollingDiscs, memory: "Course", t: float, tau: float, h: float, work: Work, chain: Parameters = None
     ) -> Frame:
         z = memory.to(memory.time + tau, work) if tau else memory
-        return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi))
+        return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi), spent=z.spent)
 
     def kinetic(self, system: RollingDiscs, memory: "Course", h: float) -> float:
         return 0.5 * float(np.vdot(memory.pi, memory.pi))
 
     def keep(self, memory: "Course") -> dict[str, Any]:
-        course = {name: getattr(memory, name) for name in ("time", "hi", "lo", "pi")}
+        course = {name: getattr(memory, name) for name in ("time", "hi", "lo", "pi", "past", "spent")}
         return course | {f"solver.{name}": value for name, value in solvers.keep(memory.solver).items()}
 
     def recall(self, memory: "Course", kept: dict[str, Any]) -> "Course":
         of_solver = {name.removeprefix("solver."): value for name, value in kept.items() if name.startswith("solver.")}
         solvers.recall(memory.solver, of_solver)
-        return Course(memory.f, memory.solver, float(kept["time"]), Phase(kept["hi"], kept["lo"], kept["pi"]))
+        z = Phase(kept["hi"], kept["lo"], kept["pi"])
+        return Course(memory.f, memory.solver, float(kept["time"]), z, kept["past"], kept["spent"])
 
 
 class Course:
-    """A running SciPy solver and its interpolated state at a time."""
+    """A running SciPy solver and its interpolated state at a time.
 
-    def __init__(self, f: Reduced, solver: "scipy.integrate.OdeSolver", time: float, z: Phase) -> None:
-        self.f, self.solver, self.time = f, solver, time
+    past, spent : (2,), work of loads and dissipated energy until the last step of the solver (one array for all states of it), and
+    until the time: integrals over the interpolated motion, by NODES in each step.
+    """
+
+    def __init__(
+        self,
+        f: Reduced,
+        solver: "scipy.integrate.OdeSolver",
+        time: float,
+        z: Phase,
+        past: Float,
+        spent: Float = NOTHING[::2],
+    ) -> None:
+        self.f, self.solver, self.time, self.past, self.spent = f, solver, time, past, spent
         self.hi, self.lo, self.pi = z
 
     def to(self, time: float, work: Work) -> "Course":
         """The same solver, stepped ahead as needed, and its state at a later time."""
         while self.solver.t < time:
+            self.past += self._spent(self.solver.t)
             message = self.solver.step()
             if self.solver.status == "failed":
                 raise ArithmeticError(f"{type(self.solver).__name__} failed at t = {self.solver.t:g}: {message}")
         work.gradients, work.solves = self.solver.nfev, self.solver.nlu
-        return Course(self.f, self.solver, time, self.f.split(self.solver.dense_output()(time)))
+        z = self.f.split(self.solver.dense_output()(time))
+        return Course(self.f, self.solver, time, z, self.past, self.past + self._spent(time))
+
+    def _spent(self, end: float) -> Float:
+        """What loads do in the last step of the solver until a time, (2,): work and dissipated energy."""
+        load, system, start, found = self.f.system.load, self.f.system, self.solver.t_old, np.zeros(2)
+        if load is None or load.conservative or start is None:
+            return found
+        motion = self.solver.dense_output()
+        for node, weight in zip(*NODES, strict=True):
+            t = start + 0.5 * (1 + node) * (end - start)
+            z = self.f.split(motion(t))
+            v = system.forward(system.basis(system.shape(z.hi)), z.pi)
+            found += 0.5 * weight * (end - start) * np.array(load.power(t, z.hi, v))
+        return found
 
 
 class RK45(SolveIvp):

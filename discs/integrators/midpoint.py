@@ -83,6 +83,7 @@ class Midpoint(OneStep):
             last, move = move, 0.5 * h * system.forward(c, p)
             if (np.abs(move - last).max(axis=1) <= self.tolerance * system.scale).all():
                 break
+        work.spend(system.load, t + 0.5 * h, h, z, move, 2 / h * move)
         work.gradients += sweep
         work.solves += sweep
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
@@ -99,6 +100,12 @@ class Composed(NamedTuple):
     fractions: Float
     sweeps: int
     tolerance: float
+
+    @property
+    def nodes(self) -> Float:
+        """Times of the forces in a step, in units of h."""
+        middles: Float = np.cumsum(self.fractions) - 0.5 * self.fractions
+        return middles
 
 
 class Room(NamedTuple):
@@ -130,6 +137,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
                 return CUT
             change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
             sweep += 1
+        do.spend(chain, time + 0.5 * tau, tau, move, 2 / tau)
         time += tau
         solves += sweep
         unconverged += stuck(method, sweep)

@@ -30,15 +30,17 @@ class RK4(OneStep):
         shape = system.shape(z.hi, z.lo)
         work.gradients += 4
 
-        def rate(tau: float, dq: Float, dpi: Float) -> tuple[Float, Float]:
+        def rate(tau: float, weight: float, dq: Float, dpi: Float) -> tuple[Float, Float]:
             moved, p = system.moved(shape, dq), z.pi + dpi
             c = system.basis(moved)
-            return system.forward(c, p), -system.pull(c, system.gradient(moved), t + tau, z, dq, p)
+            v = system.forward(c, p)
+            work.spend(system.load, t + tau, weight, z, dq, v)
+            return v, -system.pull(c, system.gradient(moved), t + tau, z, dq, p)
 
-        q1, p1 = rate(0.0, np.zeros_like(z.hi), np.zeros_like(z.pi))
-        q2, p2 = rate(h / 2, h / 2 * q1, h / 2 * p1)
-        q3, p3 = rate(h / 2, h / 2 * q2, h / 2 * p2)
-        q4, p4 = rate(h, h * q3, h * p3)
+        q1, p1 = rate(0.0, h / 6, np.zeros_like(z.hi), np.zeros_like(z.pi))
+        q2, p2 = rate(h / 2, h / 3, h / 2 * q1, h / 2 * p1)
+        q3, p3 = rate(h / 2, h / 3, h / 2 * q2, h / 2 * p2)
+        q4, p4 = rate(h, h / 6, h * q3, h * p3)
         dq, dpi = (h / 6 * (a + 2 * b + 2 * c + d) for a, b, c, d in ((q1, q2, q3, q4), (p1, p2, p3, p4)))
         return Phase(*add(z.hi, z.lo, dq), z.pi + dpi)
 
@@ -82,6 +84,7 @@ def _step(method: Explicit, chain: Parameters, work: Any, room: Room, before: Ph
         do.basis(chain, work, move, c)
         forward(c, p, v)
         do.pullback(chain, work, before, t + nodes[i] * h, move, c, p, g)
+        do.spend(chain, t + nodes[i] * h, weights[i] * h / 6, v, 1.0)
         for row in range(v.shape[0]):
             rate, so_far, to = v[row], total[row], move[row]
             for k in range(rate.size):

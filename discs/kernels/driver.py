@@ -35,6 +35,7 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
     g = np.empty((columns(rows), n * few))
     gradients, solves, unconverged, lost, passed, doubted, blown = 0, 0, 0, -1, 0, False, False
     due = looks[0] - first if looks.size else -1  # steps of this call
+    spent, kept = chain.load.spent, np.empty(chain.load.spent.size)
     do.settle(chain, work, before.hi, before.lo)
     do.lost(chain, work, slope)
     for step in range(steps):
@@ -49,6 +50,8 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
             if step == due - 3:
                 place[:] = 0.0
             add_up(before.hi, -1.0 if step == due - 3 else 3.0 if step == due - 2 else -3.0, place)
+        for j in range(spent.size):
+            kept[j] = spent[j]
         new = do.step(method, chain, work, room, before, after, t + step * h, h)
         if new[0] < 0:
             return -1, gradients, solves, unconverged, -1, passed, doubted, False
@@ -59,6 +62,8 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
                 do.kick(before, after, chain, work, t + step * h, h, c, g, place)
             if judge(before.hi, after.hi, place, defects[passed]) > limit:
                 steps, doubted = step, True
+                for j in range(spent.size):
+                    spent[j] = kept[j]
                 break
             passed += 1
             due = looks[passed] - first if passed < looks.size else -1

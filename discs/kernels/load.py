@@ -1,4 +1,8 @@
-"""Compiled loads that are linear, or none: one type, so that a load needs no kernels of its own. Plain twins: `discs.loads`."""
+"""Compiled loads: one type for all of them, or none, so that a load needs no kernels of its own. Plain twin: `discs.loads.Linear`.
+
+Compiled code cannot call a signal. It is given the values of signals at the times at which a method evaluates forces, and finds
+those of a time by bisection. A time that is not among them gives NaN, which stops the run.
+"""
 
 from typing import NamedTuple
 
@@ -6,25 +10,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import fill
+from discs.kernels.compiled import fill, part
 from discs.kernels.shared import column
 
 
 class Linear(NamedTuple):
-    """f = constant - damping v - stiffness q, all (rows, n); without rows for none."""
+    """f = constant - damping v - stiffness q - B^T (viscosity) B v + sum_k (signal k) (pattern k); arrays without entries for none.
+
+    constant, damping, stiffness : (rows, n). viscosity : (columns, n + 1), of the rates of theta and phi, link j before disc j; B v
+    is the difference of neighbours. patterns : (K, rows, n). times : (M,), increasing. values : (M, K), signals at these times.
+    near : (1,), how far a time may be from one of them. spent : (4,), work and dissipated energy since the last call from Python,
+    each with its lost digits.
+    """
 
     constant: NDArray
     damping: NDArray
     stiffness: NDArray
+    viscosity: NDArray
+    patterns: NDArray
+    times: NDArray
+    values: NDArray
+    near: NDArray
+    spent: NDArray
 
 
 NONE = np.empty((0, 0))
-UNLOADED = Linear(NONE, NONE, NONE)
+UNLOADED = Linear(NONE, NONE, NONE, NONE, np.empty((0, 0, 0)), np.empty(0), NONE, np.empty(0), np.empty(0))
 
 
 @fill(do.loaded, Linear)
 def _loaded(load):
     return load.constant.size > 0
+
+
+@part
+def at(load, t):
+    """The row of the table of signals that is nearest to the time t; -1 if none is near."""
+    low, high = 0, load.times.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if load.times[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    if high < 0:
+        return -1
+    row = high if abs(load.times[high] - t) < abs(load.times[low] - t) else low
+    return row if abs(load.times[row] - t) <= load.near[0] else -1
 
 
 @fill(do.push, Linear)
@@ -36,12 +68,73 @@ def _push(load, state, t, move, c, p, factor, g):
         for i in range(a.size):
             f = constant[i] - damping[i] * (a[i] * rate[i]) - stiffness[i] * (hi[i] + (lo[i] + step[i]))
             to[i] += factor * a[i] * f
+    for row in range(load.viscosity.shape[0]):
+        a, rate, links, to = c[2 + row], p[row], load.viscosity[row], g[row]
+        last = a.size - 1
+        for j in range(last + 2):  # the link between discs i and k
+            i, k = j - 1 if j > 0 else last, j if j <= last else 0
+            f = links[j] * (a[k] * rate[k] - a[i] * rate[i])
+            if j <= last:
+                to[k] -= factor * a[k] * f
+            if j > 0:
+                to[i] += factor * a[i] * f
+    if load.patterns.shape[0] > 0:
+        place = at(load, t)
+        for k in range(load.patterns.shape[0]):
+            signal = factor * load.values[place, k] if place >= 0 else np.nan
+            for row in range(c.shape[0]):
+                a, pattern, to = c[row], load.patterns[k, row], g[column(row)]
+                for i in range(a.size):
+                    to[i] += signal * a[i] * pattern[i]
 
 
 @fill(do.guide, Linear)
-def _guide(load, c, d, g, roll, turn):
+def _guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
     for row in range(load.constant.shape[0]):
         a, damping, stiffness = c[row], load.damping[row], load.stiffness[row]
         to = turn if column(row) else roll
         for i in range(a.size):
             to[i] += a[i] * a[i] * (d * damping[i] + g * stiffness[i])
+    for row in range(load.viscosity.shape[0]):
+        a, links = c[2 + row], load.viscosity[row]
+        to, beside = (turn, turn_beside) if row else (roll, roll_beside)
+        last = a.size - 1
+        for i in range(last + 1):
+            to[i] += d * a[i] * a[i] * (links[i] + links[i + 1])
+            beside[i] -= d * links[i + 1] * a[i] * a[i + 1 if i < last else 0]
+
+
+@part
+def book(spent, at, amount):
+    """Add an amount to the sum spent[at], whose lost digits are in spent[at + 1] (Knuth's two-sum)."""
+    term = amount + spent[at + 1]
+    total = spent[at] + term
+    part = total - spent[at]
+    spent[at + 1] = (spent[at] - (total - part)) + (term - part)
+    spent[at] = total
+
+
+@fill(do.spend, Linear)
+def _spend(load, t, weight, v, scale):
+    if load.spent.size == 0:
+        return
+    work, dissipated = 0.0, 0.0
+    for row in range(load.damping.shape[0]):
+        rate, damping = v[row], load.damping[row]
+        for i in range(rate.size):
+            dissipated += damping[i] * rate[i] * rate[i]
+    for row in range(load.viscosity.shape[0]):
+        rate, links = v[2 + row], load.viscosity[row]
+        for j in range(1, rate.size + 1):
+            apart = rate[j if j < rate.size else 0] - rate[j - 1]
+            dissipated += links[j] * apart * apart
+    if load.patterns.shape[0] > 0:
+        place = at(load, t)
+        for k in range(load.patterns.shape[0]):
+            signal = load.values[place, k] if place >= 0 else np.nan
+            for row in range(v.shape[0]):
+                rate, pattern = v[row], load.patterns[k, row]
+                for i in range(rate.size):
+                    work += signal * pattern[i] * rate[i]
+    book(load.spent, 0, weight * scale * work)
+    book(load.spent, 2, weight * scale * scale * dissipated)

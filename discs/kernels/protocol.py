@@ -125,6 +125,14 @@ def moved(chain, method, room, sweep, h):
     """The largest move of the stages by a sweep, number `sweep` from 0, in units of the scale. May improve p and v."""
 
 
+@stub
+def spend(chain, t, weight, v, scale):
+    """Book the work of the loads of a chain, and what they dissipate, in a time `weight` around t at the velocities `scale` v.
+
+    Also for a load, `chain.load`; nothing for chains without loads.
+    """
+
+
 # Functions of a method, for the driver
 
 
@@ -225,5 +233,8 @@ def push(load, state, t, move, c, p, factor, g):
 
 
 @stub
-def guide(load, c, d, g, roll, turn):
-    """Add the diagonal matrix d C^T D C + g C^T (stiffness) C to roll (n,) and, for steered discs, to turn (n,)."""
+def guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
+    """Add the matrix d C^T D C + g C^T (stiffness) C to the entries of rolls and, for steered discs, of turns.
+
+    roll, turn : (n,), the diagonal. roll_beside, turn_beside : (n,), entries of a disc and the next one.
+    """

@@ -183,3 +183,8 @@ def _forwards(chain, work, c, p, v):
 def _forces(chain, work, state, t, moves, c, p, g):
     for i in range(p.shape[0]):
         do.pullback(chain, work, state, t[i], moves[i], c[i], p[i], g[i])
+
+
+@fill(do.spend, object)
+def _spend(chain, t, weight, v, scale):
+    pass

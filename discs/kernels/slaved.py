@@ -183,7 +183,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
     if do.loaded(chain.load):
         forward(c, p, work.step, half)
         do.push(chain.load, state, t + half, work.step, c, p, half, work.rhs)
-    do.guide(chain.load, c, half, half * half, m.a, m.a)
+    do.guide(chain.load, c, half, half * half, m.a, m.u, m.a, m.u)
     factor(chain, m)
     solve(chain, m, b)
     for i in range(n):
@@ -204,7 +204,7 @@ def _precondition(chain, stiff, c, d, g, matrix):
         matrix.u[i] = g * stiff.u[i]
         matrix.w[i] = g * stiff.w[i]
     matrix.corner[0], matrix.corner[1] = g * stiff.corner[0], g * stiff.corner[1]
-    do.guide(chain.load, c, d, g, matrix.a, matrix.a)
+    do.guide(chain.load, c, d, g, matrix.a, matrix.u, matrix.a, matrix.u)
     factor(chain, matrix)
 
 
@@ -216,6 +216,11 @@ def _correct(chain, matrix, r):
 @fill(do.potential, Slaved)
 def _potential(chain, work):
     return do.elastic(chain.links, work.base)
+
+
+@fill(do.spend, Slaved)
+def _spend(chain, t, weight, v, scale):
+    do.spend(chain.load, t, weight, v, scale)
 
 
 @fill(do.vanishing, Slaved)

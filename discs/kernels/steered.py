@@ -179,7 +179,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
     do.push(chain.load, state, t + half, work.step, c, p, half, b)
     if first:  # later sweeps of a step use the same matrix, see `discs.integrators.midpoint`
         assemble(chain, work, c, 1.0, half * half, m.d, m.o)
-        do.guide(chain.load, c, half, half * half, m.d[0], m.d[2])
+        do.guide(chain.load, c, half, half * half, m.d[0], m.o[0], m.d[2], m.o[3])
         factor(chain, m)
     solve(chain, m, b)
     for row in range(2):
@@ -203,7 +203,7 @@ def _precondition(chain, stiff, c, d, g, matrix):
     for row in range(4):
         for i in range(n):
             matrix.o[row, i] = g * stiff.o[row, i]
-    do.guide(chain.load, c, d, g, matrix.d[0], matrix.d[2])
+    do.guide(chain.load, c, d, g, matrix.d[0], matrix.o[0], matrix.d[2], matrix.o[3])
     factor(chain, matrix)
 
 
@@ -219,6 +219,11 @@ def _potential(chain, work):
         for j in range(1, work.strain.shape[1]):
             total += chain.stiffness[row, j] * work.strain[row, j] ** 2
     return 0.5 * total
+
+
+@fill(do.spend, Steered)
+def _spend(chain, t, weight, v, scale):
+    do.spend(chain.load, t, weight, v, scale)
 
 
 @fill(do.vanishing, Steered)

@@ -1,40 +1,69 @@
-"""Loads that are linear in positions and velocities, disc by disc."""
+"""Loads that are linear in positions and velocities, and patterns over the discs times signals of time."""
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from discs.arrays import Float
+from discs.loads import signals
+from discs.loads.signals import Signal
 from discs.skew import Load
+
+NEAR = 1e-6  # of a step: two times of forces that are nearer count as one
+
+
+class Drive(NamedTuple):
+    """The part signal(t) pattern of a load.
+
+    pattern : (rows, n). name : of the load, for messages. strain : None, or a rest strain, see `Linear.strain`; the force then
+    comes from the energy of springs. closing : pattern q of a ring lacks this, due to the whole turns of its heading.
+    """
+
+    pattern: Float
+    signal: Signal
+    name: str
+    strain: Float | None = None
+    closing: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Linear(Load):
-    """f = constant - damping v - stiffness q, with rows x, y, theta (and phi) and a column for each disc.
+    """f = constant - damping v - stiffness q - B^T (viscosity) B v + sum of drives, with rows x, y, theta (and phi).
 
-    Its potential is the sum of stiffness q^2/2 - constant q, the least where stiffness q = constant.
+    Its potential is offset + |strain|^2/2 + the sum of stiffness q^2/2 - constant q. Drives with a strain add to `strain` and to
+    `constant` in it. (Springs with a rest strain e: S (a - e)^2/2 = S a^2/2 - S e a + |strain|^2/2, with strain = e sqrt(S).)
 
     Attributes
     ----------
     constant : (rows, n), force in rows x and y, torque in the others; any shape that broadcasts with the other two.
     damping, stiffness : the same, >= 0, force per velocity and per length, torque per rate and per angle.
+    viscosity : see `Load`, >= 0, torque per rate; None for none.
+    offset : energy.
+    strain : rest strains of springs, times the root of their stiffness; any shape.
+    drives : the parts that depend on time.
+    floor : a lower bound of the potential, or of its sum with that of the springs; None for the one where stiffness q = constant.
 
     Raises
     ------
-    ValueError : for a negative damping or stiffness, values that are not finite, or shapes that do not fit each other.
+    ValueError : for a negative damping, stiffness or viscosity, values that are not finite, or shapes that do not fit each other.
     """
 
     constant: Any = 0.0
     damping: Any = 0.0
     stiffness: Any = 0.0
+    viscosity: Any = None
+    offset: float = 0.0
+    strain: Any = 0.0
+    drives: tuple[Drive, ...] = ()
+    floor: float | None = None
 
     def __post_init__(self) -> None:
         names = ("constant", "damping", "stiffness")
         given = [np.asarray(getattr(self, name), dtype=float) for name in names]
         try:
-            values = np.broadcast_arrays(*given)
+            values = np.broadcast_arrays(*given, *(np.empty(drive.pattern.shape) for drive in self.drives))[:3]
         except ValueError:
             shapes = ", ".join(str(value.shape) for value in given)
             raise ValueError(f"constant, damping and stiffness must have one shape, (rows, discs); got {shapes}") from None
@@ -42,20 +71,69 @@ class Linear(Load):
             if not np.isfinite(value).all() or (name != "constant" and (value < 0).any()):
                 raise ValueError(f"{name} must be finite{'' if name == 'constant' else ' and at least 0'}; got {value}")
             object.__setattr__(self, name, np.array(value))
-        object.__setattr__(self, "conservative", not self.damping.any())
+        object.__setattr__(self, "conservative", not self.damping.any() and self.viscosity is None and not self.drives)
         pushed = self.constant != 0
         push, spring = self.constant[pushed], self.stiffness[pushed]
-        object.__setattr__(self, "least", -0.5 * float((push**2 / spring).sum()) if spring.all() else -np.inf)
+        least = self.offset - 0.5 * float((push**2 / spring).sum()) if spring.all() else -np.inf
+        object.__setattr__(self, "least", least if self.floor is None else self.floor)
 
-    def potential(self, q: Float) -> float:
-        return float(np.vdot(0.5 * self.stiffness * q - self.constant, q))
+    def potential(self, t: float, q: Float) -> float:
+        own = self.offset + 0.5 * float(np.sum(self.strain**2)) + float(np.vdot(0.5 * self.stiffness * q - self.constant, q))
+        return own + self.driven(t, q) if self.drives else own
+
+    def driven(self, t: float, q: Float) -> float:
+        total, strain = 0.0, self.strain
+        for drive in self.drives:
+            if drive.strain is not None:
+                signal = _at(drive, t)
+                strain = strain + signal * drive.strain
+                total -= signal * (float(np.vdot(drive.pattern, q)) + drive.closing)
+        return total + 0.5 * float(np.sum(strain**2) - np.sum(self.strain**2))
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = self.constant - self.damping * v - self.stiffness * q
+        if self.viscosity is not None:
+            found[2:] += np.diff(self.viscosity * self._apart(v))
+        for drive in self.drives:
+            found += _at(drive, t) * drive.pattern
         return found
+
+    def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
+        work = sum(_at(drive, t) * float(np.vdot(drive.pattern, v)) for drive in self.drives)
+        dissipated = float(np.vdot(self.damping * v, v))
+        if self.viscosity is not None:
+            dissipated += float((self.viscosity * self._apart(v) ** 2)[:, 1:].sum())
+        return work, dissipated
+
+    @staticmethod
+    def _apart(v: Float) -> Float:
+        """Differences of neighbours in the rows from theta on, (columns, n + 1), around a ring."""
+        return np.diff(v[2:], prepend=v[2:, -1:], append=v[2:, :1])
 
     @cached_property
     def parameters(self) -> Any:
         from discs.kernels import load
 
-        return load.Linear(self.constant, self.damping, self.stiffness)
+        links = np.empty((0, 0)) if self.viscosity is None else self.viscosity
+        patterns = np.array([drive.pattern for drive in self.drives]).reshape(-1, *self.constant.shape)
+        none = np.empty((0, len(self.drives)))
+        return load.Linear(
+            self.constant, self.damping, self.stiffness, links, patterns, np.empty(0), none, np.empty(1), np.empty(0)
+        )
+
+    def timed(self, times: Float, h: float) -> Any:
+        """For each run and call anew, with sums of its own for work and dissipated energy."""
+        if self.conservative:
+            return self.parameters
+        filled = self.parameters._replace(spent=np.zeros(4))
+        if not self.drives:
+            return filled
+        times = np.sort(times)
+        times = times[np.diff(times, prepend=-np.inf) > 0]
+        values = np.stack([signals.values(drive.signal, times, drive.name) for drive in self.drives], axis=1)
+        return filled._replace(times=times, values=values, near=np.array([NEAR * h + 4e-16 * abs(times[-1])]))
+
+
+def _at(drive: Drive, t: float) -> float:
+    """The signal of a drive at a time."""
+    return float(signals.values(drive.signal, np.array([t]), drive.name)[0])

@@ -18,15 +18,39 @@ class Total(Load):
     def __post_init__(self) -> None:
         for name in ("damping", "stiffness"):
             object.__setattr__(self, name, np.sum([getattr(load, name) for load in self.loads], axis=0))
+        object.__setattr__(self, "viscosity", viscosity(self.loads))
         object.__setattr__(self, "conservative", all(load.conservative for load in self.loads))
         object.__setattr__(self, "least", sum(load.least for load in self.loads))
 
-    def potential(self, q: Float) -> float:
-        return sum(load.potential(q) for load in self.loads)
+    def potential(self, t: float, q: Float) -> float:
+        return sum(load.potential(t, q) for load in self.loads)
+
+    def driven(self, t: float, q: Float) -> float:
+        return sum(load.driven(t, q) for load in self.loads)
+
+    def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
+        work, dissipated = np.sum([load.power(t, q, v) for load in self.loads], axis=0)
+        return float(work), float(dissipated)
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = np.sum([load.force(t, q, v) for load in self.loads], axis=0)
         return found
+
+
+def viscosity(loads: tuple[Load, ...] | list[Linear]) -> Float | None:
+    """The sum of the viscosities of loads, None if there is none."""
+    present = [load.viscosity for load in loads if load.viscosity is not None]
+    found: Float | None = np.sum(present, axis=0) if present else None
+    return found
+
+
+def _floor(loads: list[Linear]) -> float | None:
+    """The floor of the sum: the given ones, and the least of the sum of those without; None if none is given."""
+    rest, given = [load for load in loads if load.floor is None], [load.floor for load in loads if load.floor is not None]
+    if not given:
+        return None
+    other = total(tuple(rest))
+    return sum(given) + (0.0 if other is None else other.least)
 
 
 def total(loads: tuple[Load, ...]) -> Load | None:
@@ -35,5 +59,14 @@ def total(loads: tuple[Load, ...]) -> Load | None:
         return None
     linear = [load for load in loads if isinstance(load, Linear)]
     if len(linear) == len(loads):
-        return Linear(*(np.sum([getattr(load, name) for load in linear], axis=0) for name in ("constant", "damping", "stiffness")))
+        return Linear(
+            constant=np.sum([load.constant for load in linear], axis=0),
+            damping=np.sum([load.damping for load in linear], axis=0),
+            stiffness=np.sum([load.stiffness for load in linear], axis=0),
+            viscosity=viscosity(linear),
+            offset=sum(load.offset for load in linear),
+            strain=sum(load.strain for load in linear),
+            drives=tuple(drive for load in linear for drive in load.drives),
+            floor=_floor(linear),
+        )
     return loads[0] if len(loads) == 1 else Total(loads)

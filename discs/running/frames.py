@@ -54,9 +54,10 @@ def wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
 def observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:
     """The quantities recorded at a frame, a time tau after the last step."""
     frame = march.frame(tau)
-    found = march.observe(frame)
+    t = march.step * march.h + tau
+    found = march.observe(t, frame)
     if want:
-        found |= _asked(march, frame, march.step * march.h + tau, want)
+        found |= _asked(march, frame, t, want)
     if offered:
         found |= march.integrator.extras(march.system, march.memory, march.h)
     return found

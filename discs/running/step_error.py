@@ -131,7 +131,7 @@ def advanced(
 ) -> tuple[Memory, Tally]:
     """The memory of the integrator some steps later, and the tally of these steps."""
     if parameters is not None:
-        return integrator.march(parameters, memory, t, h, steps, np.inf)
+        return integrator.march(system, parameters, memory, t, h, steps, np.inf)
     work = Work()
     for _ in range(steps):
         memory, t = integrator.advance(system, memory, t, h, work), t + h

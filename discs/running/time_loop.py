@@ -20,6 +20,9 @@ WATCHED = ("looks", "passed", "doubted", "defects", "places")  # attributes of a
 CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown between calls, Ctrl-C is polled in every sweep
 
 
+TABLED = 20_000  # steps of one compiled call whose loads have tables of their signals
+
+
 class SimulationError(RuntimeError):
     """A run that failed.
 
@@ -80,6 +83,8 @@ class March:
         self.twin: FixedStep | None = fixed if self.parameters is not None else None  # steps compiled
         self.explicit = integrator.stability_limit < np.inf
         self.chunk = CHUNK // self.system.n or 1
+        if self.system.load is not None:
+            self.chunk = min(self.chunk, TABLED)
         self.bound = problem.blown_up
         if problem.ill_posed:
             warn(problem.ill_posed)
@@ -103,8 +108,8 @@ class March:
 
         with compiling(say, NOTICE):
             if self.twin is not None:
-                self.twin.march(self.parameters, self.memory, 0.0, self.h, 0, self.bound)
-            self.observe(self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
+                self.twin.march(self.system, self.parameters, self.memory, 0.0, self.h, 0, self.bound)
+            self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
         _PREPARED.add(key)
 
     def keep(self) -> dict[str, Any]:
@@ -117,7 +122,8 @@ class March:
         """Restore what `keep` returned for the same run."""
         self.step = int(kept["step"])
         for name in vars(self.work):
-            setattr(self.work, name, int(kept[f"work.{name}"]))
+            value = kept[f"work.{name}"]
+            setattr(self.work, name, value if value.ndim else int(value))
         if self.watch:
             for name in WATCHED:
                 value = kept[f"watch.{name}"]
@@ -135,7 +141,9 @@ class March:
                 steps = min(self.chunk, step - self.step)
                 if watch is not None:
                     steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
-                self.memory, tally = self.twin.march(self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks)
+                self.memory, tally = self.twin.march(
+                    self.system, self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks
+                )
                 taken = self._accept(self.twin, before, tally)
         except Cut:  # drop this call
             self.memory = before
@@ -197,8 +205,8 @@ class March:
             self._check_energy(self.system.kinetic(frame.rate), frame, self.step, time)
         return frame
 
-    def observe(self, frame: Frame) -> dict[str, Any]:
-        """The quantities that every frame records, by their names in `Solution`."""
+    def observe(self, t: float, frame: Frame) -> dict[str, Any]:
+        """The quantities that every frame records, by their names in `Solution`; t is its time."""
         system = self.system
         if frame.seen is not None:
             q, energy, slip = frame.seen
@@ -211,9 +219,13 @@ class March:
             shape = system.shape(frame.hi, frame.lo)
             q, energy = frame.hi + frame.lo, system.kinetic(frame.rate) + system.potential(shape)
             slip = np.hypot(*(frame.rate[:2] - system.contact(shape) * frame.rate[2])).max()
-        if system.load is not None:
-            energy += system.load.potential(q)
         found = dict(zip(system.rows, q, strict=True)) | dict(zip(system.rates[2:], frame.rate[2:], strict=True))
+        if (load := system.load) is not None:
+            energy += load.potential(t, q)
+            if not load.conservative:
+                work, dissipated = self.work.spent[::2] + self.work.spent[1::2] + frame.spent
+                work += load.driven(t, q) - load.driven(0.0, self.problem.start().hi)
+                found["balance"] = np.array([work, dissipated])
         return found | {"energy": energy, "rolling_residual": slip}
 
     def _plain(self) -> int:
@@ -249,7 +261,9 @@ class March:
         watch = self.watch
         self.work.add(tally)
         if tally.lost >= 0:
-            previous, _ = twin.march(self.parameters, previous, self.step * self.h, self.h, tally.steps - 1, self.bound)
+            previous, _ = twin.march(
+                self.system, self.parameters, previous, self.step * self.h, self.h, tally.steps - 1, self.bound
+            )
         if tally.lost >= 0 or tally.blown:
             self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
         if watch is not None:

@@ -37,11 +37,10 @@ def by_multipliers(problem: Problem):
     """The end by Lagrange-d'Alembert with multipliers and the same forces, by DOP853: another formulation, another method."""
     n, free = problem.chain.n, lagrange_dalembert(replace(problem, loads=()), dense=True)
 
-    def force(q, v):
-        push = sum(load.force(0.0, q.reshape(-1, n), v.reshape(-1, n)) for load in problem.loads)
-        return free.force(q, v) + push.ravel()
+    def push(t, q, v):
+        return sum(load.force(t, q.reshape(-1, n), v.reshape(-1, n)) for load in problem.loads).ravel()
 
-    expected = replace(free, force=force).integrate(*coordinates(problem), [0.0, 1.0], rtol=1e-9)
+    expected = replace(free, applied=push).integrate(*coordinates(problem), [0.0, 1.0], rtol=1e-9)
     return expected.q[-1].reshape(-1, n), expected.multipliers[-1].reshape(2, n)
 
 
@@ -127,7 +126,7 @@ def test_potentials_of_loads_are_part_of_the_energy(model, kernels_as_python):
     problem = held(0.3, 0.2, model)
     for engine in ("compiled", "plain"):
         run = simulate(problem, Midpoint(tolerance=1e-14), 0.02, 3, progress=False, engine=engine)
-        alone = [e - problem.system.load.potential(q) for e, q in zip(run.energy, positions(run), strict=True)]
+        alone = [e - problem.system.load.potential(0.0, q) for e, q in zip(run.energy, positions(run), strict=True)]
         assert abs(run.energy - problem.energy()).max() < (1e-12 if problem.system.quadratic else 1e-11)
         assert abs(alone[-1] - alone[0]) > 1e-3
 
@@ -144,7 +143,7 @@ class Well(Load):
     def __init__(self, shape):
         self.damping = self.stiffness = np.zeros(shape)
 
-    def potential(self, q):
+    def potential(self, t, q):
         return -0.25 * np.cos(4 * q[1]).sum()
 
     def force(self, t, q, v):
@@ -160,7 +159,7 @@ def test_the_energy_of_a_load_of_ones_own_is_watched():
     assert problem.conserves
     assert problem.blown_up == np.inf
     false = Well((3, 5))
-    false.potential = lambda q: 0.0
+    false.potential = lambda t, q: 0.0
     with pytest.warns(UserWarning, match="rk4: energy is conserved, but at t = .* it is"):
         simulate(replace(problem, loads=(false,)), "rk4", 0.002, 11, progress=False)
 
@@ -176,7 +175,7 @@ def test_the_bound_of_kinetic_energy_knows_the_loads():
     assert [p.conserves for p in (problem, free, pushed, braked)] == [True, True, True, False]
     both = total((Well((3, 7)), *held(0.3, 0.2).loads))
     q = problem.start().hi
-    assert both.potential(q) == pytest.approx(sum(load.potential(q) for load in both.loads))
+    assert both.potential(0.0, q) == pytest.approx(sum(load.potential(0.0, q) for load in both.loads))
     assert (both.conservative, both.least) == (True, -np.inf)
 
 

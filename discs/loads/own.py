@@ -1,0 +1,84 @@
+"""Loads of one's own, in NumPy: a potential in the plane, and any force. Runs with them take the plain engine."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from discs import checks
+from discs.arrays import Float
+from discs.loads.binding import Discs, OnRod, spread
+from discs.skew import Load
+
+
+@dataclass(frozen=True)
+class Potential(OnRod):
+    """A potential energy per length, V(x, y): a disc with the share w of the length has w V and feels -w grad V.
+
+    Parameters
+    ----------
+    V : function of the contact points x, y (n,) that returns (n,).
+    gradient : function of the same that returns (dV/dx, dV/dy), each (n,).
+    """
+
+    V: Callable[[Float, Float], Float]
+    gradient: Callable[[Float, Float], tuple[Float, Float]]
+
+    def on(self, chain: Discs) -> Load:
+        for name in ("V", "gradient"):
+            if not callable(given := getattr(self, name)):
+                raise ValueError(f"{name} of Potential must be a function of x and y; got {checks.shown(given)}")
+        return _Field(self, chain)
+
+
+class _Field(Load):
+    conservative = True
+
+    def __init__(self, of: Potential, chain: Discs) -> None:
+        self._of, self._w = of, chain.w
+        self.damping = self.stiffness = spread(chain, {})
+
+    def potential(self, t: float, q: Float) -> float:
+        return float(self._w @ np.broadcast_to(self._of.V(q[0], q[1]), self._w.shape))
+
+    def force(self, t: float, q: Float, v: Float) -> Float:
+        f = np.zeros_like(q)
+        f[0], f[1] = (-self._w * part for part in self._of.gradient(q[0], q[1]))
+        return f
+
+
+@dataclass(frozen=True)
+class Custom(OnRod):
+    """Any force on the discs: all that it does is work.
+
+    Parameters
+    ----------
+    force : function of t, q and v, positions and velocities (rows, n) with rows x, y, theta (and phi), that returns the generalised
+        forces (rows, n) on the discs; not per length.
+    power : function of the same that returns the rate of its work; None for the sum of force times v.
+    """
+
+    force: Callable[[float, Float, Float], Float]
+    power: Callable[[float, Float, Float], float] | None = None
+
+    def on(self, chain: Discs) -> Load:
+        if not callable(self.force) or not (self.power is None or callable(self.power)):
+            raise ValueError(f"force and power of Custom must be functions of t, q and v; got {checks.shown(self)}")
+        return _Own(self, chain)
+
+
+class _Own(Load):
+    def __init__(self, of: Custom, chain: Discs) -> None:
+        self._of = of
+        self.damping = self.stiffness = spread(chain, {})
+
+    def force(self, t: float, q: Float, v: Float) -> Float:
+        found = np.asarray(self._of.force(t, q, v), dtype=float)
+        if found.shape != q.shape or not np.isfinite(found).all():
+            got = f"shape {found.shape}" if found.shape != q.shape else "values that are not finite"
+            raise ValueError(f"Custom: the force must be finite numbers of shape {q.shape}; got {got} at t = {t:g}")
+        return found
+
+    def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
+        power = self._of.power
+        return (super().power(t, q, v)[0] if power is None else float(power(t, q, v))), 0.0

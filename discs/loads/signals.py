@@ -1,0 +1,149 @@
+"""Signals: functions of time that loads are multiplied by, named so that scene files can hold them.
+
+Each is a frozen function of t, a number or an array. Any other function of a number t can be a signal too.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from discs import checks
+from discs.arrays import Float
+
+Signal = Callable[[float], Any]
+
+
+class Named:
+    """A signal that takes arrays of times."""
+
+    def __call__(self, t: ArrayLike) -> Float:
+        raise NotImplementedError
+
+
+def _settle(signal: Named, *names: str) -> None:
+    for name in names:
+        object.__setattr__(signal, name, checks.number(f"{name} of {type(signal).__name__}", getattr(signal, name)))
+
+
+@dataclass(frozen=True)
+class sine(Named):
+    """amplitude sin(rate t + phase)."""
+
+    amplitude: float
+    rate: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        _settle(self, "amplitude", "rate", "phase")
+
+    def __call__(self, t: ArrayLike) -> Float:
+        found: Float = self.amplitude * np.sin(self.rate * np.asarray(t) + self.phase)
+        return found
+
+
+@dataclass(frozen=True)
+class ramp(Named):
+    """0 until t0, then a straight line to 1 at t1, then 1."""
+
+    t0: float
+    t1: float
+
+    def __post_init__(self) -> None:
+        _settle(self, "t0", "t1")
+        if not self.t0 < self.t1:
+            raise ValueError(f"t0 of {type(self).__name__} must be less than t1; got {self.t0:g} and {self.t1:g}")
+
+    def __call__(self, t: ArrayLike) -> Float:
+        found: Float = np.clip((np.asarray(t) - self.t0) / (self.t1 - self.t0), 0.0, 1.0)
+        return found
+
+
+@dataclass(frozen=True)
+class smooth(ramp):
+    """0 until t0, 1 from t1 on, four continuous derivatives: x^5 (126 - 420 x + 540 x^2 - 315 x^3 + 70 x^4) of the ramp x."""
+
+    def __call__(self, t: ArrayLike) -> Float:
+        x = super().__call__(t)
+        found: Float = x**5 * (126 + x * (-420 + x * (540 + x * (-315 + 70 * x))))
+        return found
+
+
+@dataclass(frozen=True)
+class pulse(Named):
+    """1 from t0 until t0 + width, otherwise 0.
+
+    Fixed steps see it at the times at which they evaluate forces, so its length is right to about a step.
+    """
+
+    t0: float
+    width: float
+
+    def __post_init__(self) -> None:
+        _settle(self, "t0", "width")
+        if self.width <= 0:
+            raise ValueError(f"width of pulse must be positive; got {self.width:g}")
+
+    def __call__(self, t: ArrayLike) -> Float:
+        since = np.asarray(t) - self.t0
+        found: Float = ((since >= 0) & (since < self.width)).astype(float)
+        return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class table(Named):
+    """Values at given times, straight lines between them; before the first and after the last time the value there.
+
+    t : (m,), increasing. values : (m,).
+    """
+
+    t: ArrayLike
+    values: ArrayLike
+
+    def __post_init__(self) -> None:
+        t = checks.array("t of table", self.t)
+        if t.ndim != 1 or not t.size or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+            raise ValueError(f"t of table must be increasing times; got {checks.shown(self.t)}")
+        object.__setattr__(self, "t", t)
+        object.__setattr__(self, "values", checks.field("values of table", self.values, t.size))
+
+    def __repr__(self) -> str:
+        return f"table({np.size(self.t)} values, t = {np.min(self.t):g} to {np.max(self.t):g})"
+
+    def __call__(self, t: ArrayLike) -> Float:
+        found: Float = np.interp(t, self.t, self.values)  # type: ignore[arg-type]  # arrays by now
+        return found
+
+
+@dataclass(frozen=True)
+class steady(Named):
+    """1."""
+
+    def __call__(self, t: ArrayLike) -> Float:
+        return np.ones(np.shape(t))
+
+
+NAMES: dict[str, type[Named]] = {cls.__name__: cls for cls in (sine, ramp, pulse, smooth, table)}
+
+
+def values(signal: Signal, times: Float, name: str) -> Float:
+    """A signal at times (m,). ValueError with `name`, the load's, and the time if it gives anything but finite real numbers."""
+    found = signal(times) if isinstance(signal, Named) else np.array([_value(signal, float(t), name) for t in times])
+    if not np.isfinite(found).all():
+        i = int(np.argmin(np.isfinite(found)))
+        raise ValueError(f"{name}: the signal {checks.shown(signal)} must give finite numbers; got {found[i]} at t = {times[i]:g}")
+    return np.asarray(found, dtype=float)
+
+
+def _value(signal: Signal, t: float, name: str) -> float:
+    value = signal(t)
+    if isinstance(value, float):
+        return value
+    try:
+        return checks.number("", value)
+    except ValueError:
+        raise ValueError(
+            f"{name}: the signal {checks.shown(signal)} must give a finite number; got {checks.shown(value)} at t = {t:g}"
+        ) from None
