@@ -55,6 +55,8 @@ def peers(problem: Problem) -> list[Peer]:
     Chains with true curvature run with peers that take the right-hand side or the saddle point from us: SciPy, CVODE, the saddle
     point.
     """
+    if problem.loads:
+        raise ValueError("peers take a problem without loads; got some: take replace(problem, loads=())")
     f = reduced.Bound(problem)
     n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
     law, curvature = (problem.chain.rolling, problem.chain.curvature) if isinstance(problem.chain, Chain) else ("own", "linear")

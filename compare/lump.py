@@ -10,7 +10,7 @@ def lump(scene: Scene, n: int, ends: str = "springs") -> Problem:
     """The rod of a scene as n discs.
 
     Disc i stands at s_i = i k for a share w_i of the length (k, and k/2 at free ends) and carries that share's mass and
-    spin inertia; the springs between discs hold the rod's torsion and bending energy.
+    spin inertia; the springs between discs hold the rod's torsion and bending energy. Loads of the scene become those of the discs.
 
     Parameters
     ----------

@@ -2,15 +2,22 @@
 
 import inspect
 import tomllib
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from continuum.rod import Scene
 from continuum.scenes import LAW, SCENES, steered_rod
 from discs import checks
+from discs.arrays import Float
 from discs.chains.twist import PAPER
 from discs.files.safe import opened
+from discs.loads import Damping, Force, OnRod, Rest, Slope, Spring, Torque, signals
 
+LOADS: dict[str, Any] = {cls.__name__: cls for cls in (Torque, Force, Slope, Spring, Damping, Rest)}
+MOST_ROWS = 100_000  # of a CSV file
 LARGEST = 2**14  # bytes of a scene file; the memory for a dotted key, as a.a.a, grows with the square of its length
 
 
@@ -22,6 +29,15 @@ def read_scene(path: str | Path) -> Scene:
         duration = 6.0
         radius = 0.7
 
+        [[loads]]
+        load = "Torque"
+        pattern = 0.3
+        at = 0.0
+        signal = { name = "sine", amplitude = 1.0, rate = 2.0 }
+
+    Each table `loads` is a load of `discs.loads` with numbers for patterns, `signal` one of `discs.loads.signals`. The signal
+    "table" has its t and values, or `file`, a CSV file beside this one with a line "t, value" for each time.
+
     Raises
     ------
     ValueError : if the file cannot be read, or if a key or value does not belong to the scene.
@@ -32,11 +48,62 @@ def read_scene(path: str | Path) -> Scene:
         raise ValueError(
             f"the scene file {path} must name its scene, as in scene = {next(iter(SCENES))!r}; its keys are {list(content)}"
         )
+    loads = content.pop("loads", [])
     make = SCENES[checks.choice("scene", content.pop("scene"), SCENES)]
     named = [name for name, p in inspect.signature(make).parameters.items() if p.kind is not p.VAR_KEYWORD]
     for key in content:
         checks.choice(f"key of {make.__name__}", key, (*named, *PAPER, *(LAW if make is not steered_rod else ())))
-    return make(**content)
+    if not isinstance(loads, list):
+        raise ValueError(f"loads of a scene file are tables [[loads]]; got {checks.shown(loads)}")
+    return replace(make(**content), loads=tuple(_load(load, Path(path).parent) for load in loads))
+
+
+def _load(given: Any, folder: Path) -> OnRod:
+    """A load from its table."""
+    if not isinstance(given, dict) or "load" not in given:
+        raise ValueError(f'a table [[loads]] must name its load, as load = "Torque"; got {checks.shown(given)}')
+    kind = LOADS[checks.choice("load", given["load"], LOADS)]
+    values = {key: value for key, value in given.items() if key != "load"}
+    _check_keys(kind, values)
+    if "signal" in values:
+        values["signal"] = _signal(values["signal"], folder)
+    load: OnRod = kind(**values)
+    return load
+
+
+def _signal(given: Any, folder: Path) -> signals.Named:
+    """A signal from its table."""
+    if not isinstance(given, dict) or "name" not in given:
+        raise ValueError(f'signal must be a table with its name, as {{ name = "sine", ... }}; got {checks.shown(given)}')
+    kind = signals.NAMES[checks.choice("signal", given["name"], signals.NAMES)]
+    values = {key: value for key, value in given.items() if key != "name"}
+    if kind is signals.table and "file" in values:
+        t, level = _columns(folder / str(values.pop("file")))
+        values |= {"t": t, "values": level}
+    _check_keys(kind, values)
+    return kind(**values)
+
+
+def _check_keys(kind: type, values: dict[str, Any]) -> None:
+    """ValueError unless the values are those of the fields of a dataclass, with none missing."""
+    known = {f.name: f.default is MISSING for f in fields(kind)}
+    for key in values:
+        checks.choice(f"key of {kind.__name__}", key, known)
+    if missing := [name for name, needed in known.items() if needed and name not in values]:
+        raise ValueError(f"{kind.__name__} needs {', '.join(missing)}; got {checks.shown(values)}")
+
+
+def _columns(path: Path) -> Float:
+    """The two columns of a CSV file, (2, m)."""
+    try:
+        with open(opened(path), encoding="utf-8") as file:
+            found = np.loadtxt(file, delimiter=",", ndmin=2, max_rows=MOST_ROWS)
+    except (ValueError, UnicodeError) as error:
+        raise ValueError(f"{path} must be lines 't, value': {error}") from None
+    if found.shape[1] != 2:
+        raise ValueError(f"{path} must be lines 't, value'; got {found.shape[1]} columns")
+    columns: Float = found.T
+    return columns
 
 
 def _toml(path: str | Path, content: bytes) -> dict[str, Any]:

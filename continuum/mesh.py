@@ -1,5 +1,7 @@
 """The rod on a mesh: second-order finite differences in s, which are the equations of rolling discs."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from continuum.initial import resolve
@@ -38,7 +40,7 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
         chain = SteeredChain(n=n, ends=ends, shift=scene.shift, turns=scene.turns, **common)
     else:
         chain = Chain(n=n, ends=ends, shift=scene.shift, rolling=scene.rolling, curvature=rod.curvature, **common)
-    return Problem(chain, State(**scene.fields(chain.s)), scene.duration)
+    return Problem(chain, State(**scene.fields(chain.s)), scene.duration, scene.loads)
 
 
 def unseen(scene: Scene, problem: Problem) -> str:
@@ -59,6 +61,7 @@ def unseen(scene: Scene, problem: Problem) -> str:
         found = resolve(scene)
     except ValueError as error:
         return f"the discs have no limit as a field: {error}"
+    problem = replace(problem, loads=())
     pi = problem.start().pi
     parts = {"potential energy": (abs(found.potential - problem.energy() + 0.5 * float(np.vdot(pi, pi))), found.potential)}
     s, w = found.quadrature(POINTS)

@@ -9,6 +9,7 @@ from discs import checks
 from discs.arrays import Float
 from discs.chains import links
 from discs.chains.rolling import ROLLING
+from discs.loads import OnRod
 
 Fields = Callable[[Float], tuple[Float, ...]]
 
@@ -110,6 +111,8 @@ class Scene:
     shift : for a closed rod, r(s + length) - r(s): (0, 0) for a ring, (length, 0) for a straight periodic rod.
     turns : for a closed `SteeredRod`, the number of full turns of the heading around it, 1 for a circle.
     name : a name for titles.
+    loads : loads of `discs.loads` whose patterns are numbers or functions of s; discs have them (`compare.lump`), `solve` does not
+        take them.
 
     Raises
     ------
@@ -124,11 +127,16 @@ class Scene:
     shift: tuple[float, float] = (0.0, 0.0)
     turns: int = 0
     name: str = "scene"
+    loads: tuple[OnRod, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.rod, Rod) or not callable(self.initial):
             raise ValueError(
                 f"a scene needs a Rod and a function of s; got {checks.shown(self.rod)} and {checks.shown(self.initial)}"
+            )
+        if not isinstance(self.loads, tuple) or not all(isinstance(load, OnRod) for load in self.loads):
+            raise ValueError(
+                f"loads of a scene must be a tuple of loads on a rod, as (Torque(...),); got {checks.shown(self.loads)}"
             )
         if not isinstance(self.closed, bool):
             raise ValueError(f"closed must be True or False; got {checks.shown(self.closed)}")
@@ -159,7 +167,8 @@ class Scene:
     def description(self) -> dict[str, object]:
         """The scene without its initial fields, as numbers and words: `Solution.stats["scene"]`."""
         names = ("name", "rolling", "duration", "closed", "shift", "turns")
-        return {name: getattr(self, name) for name in names} | asdict(self.rod)
+        loads = {"loads": [checks.shown(load) for load in self.loads]} if self.loads else {}
+        return {name: getattr(self, name) for name in names} | asdict(self.rod) | loads
 
     @property
     def steered(self) -> bool:

@@ -82,6 +82,10 @@ def solve(
     if not isinstance(scene, Scene):
         instead = "; simulate(problem) runs discs" if isinstance(scene, Problem) else ""
         raise ValueError(f"solve takes a Scene, such as untwisting_rod(); got {type(scene).__name__}{instead}")
+    if scene.loads:
+        raise ValueError(
+            "solve takes a scene without loads; discs take them: simulate(lump(scene, n)), or replace(scene, loads=())"
+        )
     fitting = ("elements",) if scene.steered else ("richardson", "leapfrog")
     if scene.rod.curvature == "linear" and not scene.steered:
         fitting = ("spectral", *fitting)

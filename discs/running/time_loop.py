@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory, Tally
 from discs.problem import Problem
+from discs.running.rounding import warn_of_lost_digits
 from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
@@ -38,20 +38,6 @@ class SimulationError(RuntimeError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.message, self.step, self.time, self.disc, self.slope)
-
-
-def _warn_of_lost_digits(system: RollingDiscs, h: float) -> None:
-    """Warn where rounding in solves with I + h^2/4 C^T S C stops the convergence of sweeps.
-
-    A sweep multiplies the remaining error by the largest entry, h^2 `stiffest`, times the unit of rounding, 1.1e-16. Sweeps do not
-    converge where this factor is near one.
-    """
-    lost = 1.1e-16 * h * h * system.stiffest
-    if lost > 0.1:
-        warn(
-            f"{system.n} discs at dt = {h:g}: each sweep of a step leaves {lost:.1g} of its error, due to rounding, and the run "
-            f"may not be trusted; take dt below {h * np.sqrt(0.1 / lost):.1g}, or fewer discs"
-        )
 
 
 class March:
@@ -89,7 +75,7 @@ class March:
         if problem.ill_posed:
             warn(problem.ill_posed)
         if integrator.stability_limit == np.inf and not integrator.adaptive:
-            _warn_of_lost_digits(self.system, h)
+            warn_of_lost_digits(self.system, h)
         self.memory: Memory = integrator.begin(self.system, problem.start(), h, self.work, self.parameters)
         if self.parameters is not None:
             self._prepare(quiet)

@@ -1,10 +1,16 @@
 """Scene files that are not as they should be; good ones: test_solve.py, any: test_bad_input.py."""
 
 import os
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from compare import lump
+from compare.entrants import peers
+from continuum import solve
 from continuum.files import read_scene
+from discs.loads import signals
 
 
 @pytest.mark.parametrize(
@@ -23,6 +29,71 @@ def test_odd_content(content, message, tmp_path):
     path.write_text(content)
     with pytest.raises(ValueError, match=message):
         read_scene(path)
+
+
+LOADED = """
+scene = "untwisting_rod"
+rolling = "unit"
+
+[[loads]]
+load = "Torque"
+pattern = 0.3
+at = 0.0
+signal = { name = "sine", amplitude = 1.0, rate = 2.0 }
+
+[[loads]]
+load = "Damping"
+rolling = 0.1
+torsion = 0.02
+
+[[loads]]
+load = "Force"
+y = 0.2
+signal = { name = "table", file = "push.csv" }
+"""
+
+
+def test_loads_in_a_file_are_those_of_the_discs(tmp_path):
+    (tmp_path / "scene.toml").write_text(LOADED)
+    (tmp_path / "push.csv").write_text("0, 0.0\n1.0, 2.0\n")
+    scene = read_scene(tmp_path / "scene.toml")
+    torque, damping, force = scene.loads
+    assert (torque.pattern, torque.at, torque.signal) == (0.3, 0.0, signals.sine(1.0, 2.0))
+    assert (damping.rolling, damping.torsion, damping.turning) == (0.1, 0.02, 0.0)
+    assert force.signal(0.25) == 0.5
+    problem, free = lump(scene, 9), lump(replace(scene, loads=()), 9)
+    q, v = problem.start().hi, np.ones((3, 9))
+    expected = np.zeros((3, 9))
+    expected[1], expected[2] = 0.2 * 0.5 * problem.chain.w, -0.1 * problem.chain.w
+    expected[2, 0] += 0.3 * np.sin(0.5)
+    np.testing.assert_allclose(problem.system.load.force(0.25, q, v), expected, atol=1e-15)
+    assert problem.energy() == free.energy()
+    assert scene.description()["loads"][1].startswith("Damping(rolling=0.1")
+    with pytest.raises(ValueError, match="solve takes a scene without loads"):
+        solve(scene)
+    with pytest.raises(ValueError, match="peers take a problem without loads"):
+        peers(problem)
+    with pytest.raises(ValueError, match="loads of a scene must be a tuple of loads on a rod"):
+        replace(scene, loads=(3,))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ('load = "Push"', "load must be one of 'Torque', 'Force'.*; got 'Push'"),
+        ("pattern = 1.0", r"a table \[\[loads\]\] must name its load"),
+        ('load = "Torque"', "Torque needs pattern"),
+        ('load = "Torque"\npattern = 1.0\nsize = 2', "key of Torque must be one of .*; got 'size'"),
+        ('load = "Torque"\npattern = 1.0\nsignal = "sine"', "signal must be a table with its name"),
+        ('load = "Torque"\npattern = 1.0\nsignal = { name = "sine", rate = 1.0 }', "sine needs amplitude"),
+        ('load = "Torque"\npattern = 1.0\nsignal = { name = "table", file = "no.csv" }', "no.csv cannot be read"),
+        ('load = "Torque"\npattern = 1.0\nsignal = { name = "table", file = "scene.toml" }', "must be lines 't, value'"),
+    ],
+)
+def test_loads_that_a_file_cannot_hold(content, message, tmp_path):
+    (tmp_path / "scene.toml").write_text('scene = "untwisting_rod"\n[[loads]]\n' + content)
+    with pytest.raises(ValueError, match=message):
+        read_scene(tmp_path / "scene.toml")
 
 
 def test_what_is_no_file_is_refused_at_once(tmp_path):
