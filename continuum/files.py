@@ -14,9 +14,9 @@ from discs import checks
 from discs.arrays import Float
 from discs.chains.twist import PAPER
 from discs.files.safe import opened
-from discs.loads import Damping, Force, OnRod, Rest, Slope, Spring, Torque, signals
+from discs.loads import Damping, Force, Motor, OnRod, Rest, Slope, Spring, Torque, signals
 
-LOADS: dict[str, Any] = {cls.__name__: cls for cls in (Torque, Force, Slope, Spring, Damping, Rest)}
+LOADS: dict[str, Any] = {cls.__name__: cls for cls in (Torque, Force, Slope, Spring, Damping, Rest, Motor)}
 MOST_ROWS = 100_000  # of a CSV file
 LARGEST = 2**14  # bytes of a scene file; the memory for a dotted key, as a.a.a, grows with the square of its length
 
@@ -65,8 +65,9 @@ def _load(given: Any, folder: Path) -> OnRod:
     kind = LOADS[checks.choice("load", given["load"], LOADS)]
     values = {key: value for key, value in given.items() if key != "load"}
     _check_keys(kind, values)
-    if "signal" in values:
-        values["signal"] = _signal(values["signal"], folder)
+    for key in values.keys() & {"signal", "rate"}:
+        if key == "signal" or isinstance(values[key], dict):
+            values[key] = _signal(values[key], folder)
     load: OnRod = kind(**values)
     return load
 

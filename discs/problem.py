@@ -14,6 +14,7 @@ from discs.chains.rolling_discs import RollingDiscs
 from discs.chains.slaved import SlavedSystem
 from discs.chains.steered import SteeredSystem
 from discs.loads import Linear, OnRod, signals, total
+from discs.loads.motor import Held
 from discs.skew import Load, Phase
 
 
@@ -101,11 +102,27 @@ class Problem:
                 for drive in load.drives:
                     signals.values(drive.signal, np.array([0.0, self.duration]), drive.name)
                 continue
+            if isinstance(load, Held):
+                self._check_motor(load)
             q = self._positions()
             force = np.asarray(load.force(0.0, q, np.zeros(shape)), dtype=float)
             if force.shape != shape or not np.isfinite(force).all():
                 got = f"shape {force.shape}" if force.shape != shape else "values that are not finite"
                 raise ValueError(f"{type(load).__name__}: the force must be finite numbers of shape {shape}; got {got} at t = 0")
+
+    def _check_motor(self, load: Held) -> None:
+        """Refuse a rate that differs from that of the initial state, or is not finite at the end."""
+        (axle,), (rate,) = load.axles, load.rates(0.0)
+        load.rates(self.duration)
+        name = "omega" if axle.row == 2 else "phi_rate"
+        initial = np.broadcast_to(getattr(self.initial, name), self.chain.n)[axle.disc]
+        if not abs(initial - rate) <= 1e-9 * max(1.0, abs(rate)):
+            raise ValueError(
+                f"Motor: its rate at t = 0 must be the initial {name} of its disc {axle.disc}, {initial:g}; got {rate:g}: "
+                "change one, or start the motor smoothly"
+            )
+        if sum(other.axles[0][:2] == axle[:2] for other in self.bound if other.axles) > 1:
+            raise ValueError(f"Motor: disc {axle.disc} has two motors about the same axis; leave one out")
 
     def _check_slopes(self, chain: Chain) -> None:
         shape = self.system.shape(self._positions())

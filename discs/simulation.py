@@ -202,6 +202,8 @@ def _run(
     system = problem.system
     if problem.loads and not integrator.takes_loads:
         raise ValueError(f"{integrator.name!r} does not take loads; take a method that does, as 'midpoint'")
+    if system.load is not None and system.load.axles and not integrator.takes_motors:
+        raise ValueError(f"{integrator.name!r} does not take motors; take an implicit method with fixed steps, as 'midpoint'")
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")

@@ -67,6 +67,7 @@ class Load(ABC):
         steps add them to their matrix. `force` is the whole of f, these parts included.
     viscosity : (columns, n + 1), of the part -B^T (viscosity) B v of f in the rows from theta on, where B v is the difference of
         neighbours. Link j is before disc j; on a ring links 0 and n are the same, at free ends they have 0. None for none.
+    axles : driven angles, of motors; see `discs.loads.motor`.
     conservative : whether f = -grad U with U = `potential`; then the energy, U included, is conserved.
     least : a lower bound of U, used to detect blow-up; -inf if none is known.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
@@ -75,6 +76,7 @@ class Load(ABC):
     damping: Float
     stiffness: Float
     viscosity: Float | None = None
+    axles: tuple[Any, ...] = ()
     conservative: bool = False
     least: float = -np.inf
 
@@ -93,6 +95,10 @@ class Load(ABC):
     @abstractmethod
     def force(self, t: float, q: Float, v: Float) -> Float:
         """f, (rows, n), at the time t, positions q (rows, n) and velocities v (rows, n)."""
+
+    def applied(self, t: float, q: Float, v: Float) -> Float:
+        """f without what motors do."""
+        return self.force(t, q, v)
 
     @property
     def parameters(self) -> Parameters:

@@ -96,6 +96,7 @@ class Solution(Result):
         energy - energy[0] = work - dissipated, to rounding for "midpoint", its compositions and the Gauss methods if V is
         quadratic, otherwise to the order of the method. Zeros without loads.
     balance : (F, 2), work and dissipated, as recorded; None if all loads are part of the energy.
+    reaction : (F, motors), torque of each motor, about the axle or the vertical; None without motors.
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
     problem : the problem of discs; of a field by "richardson", the one on the finest mesh; otherwise None.
     error_estimate : estimated largest error over discs (or nodes) and frames, by quantity; None if it was not estimated.
@@ -120,6 +121,7 @@ class Solution(Result):
     tension: Float | None = None
     modified_energy: Float | None = None
     balance: Float | None = None
+    reaction: Float | None = None
     error_estimate: dict[str, float] | None = None
     problem: Problem | None = None
 

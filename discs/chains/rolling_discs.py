@@ -83,6 +83,20 @@ class RollingDiscs(SkewGradient):
         found: Float = mass * (e * (torque / inertia) + turning * omega) + gradient[:2]
         return found
 
+    def motor_torques(self, shape: Shape, v: Float, f: Float, changes: Float) -> Float:
+        """Torques of motors, (motors,), for rates v (rows, n), other loads f (rows, n) and accelerations of the driven angles.
+
+        From w (alpha + rho |e|^2) omega. + rho w omega e . e. = -e . g_r - g_theta + tau and J w Omega. = -g_phi + tau.
+        """
+        assert self.load is not None
+        gradient, e = self.gradient(shape) - f, self.contact(shape)
+        turning = self.weights[0] * v[2] * (e * self.contact_rate(shape, v)).sum(axis=0)
+        inertia = np.array([self.weights[2] + self.weights[0] * (e * e).sum(axis=0), *self.weights[3:]])
+        rest = np.array([turning + (e * gradient[:2]).sum(axis=0) + gradient[2], *gradient[3:]])
+        at = np.array([(axle.row - 2, axle.disc) for axle in self.load.axles]).T
+        found: Float = inertia[at[0], at[1]] * changes + rest[at[0], at[1]]
+        return found
+
     @property
     @abstractmethod
     def parameters(self) -> Parameters:

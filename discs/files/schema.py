@@ -46,6 +46,7 @@ QUANTITIES = {
     "tension": Quantity(("link",), "mass length per time squared", "tension of the links"),
     "energy": Quantity((), "mass length squared per time squared", "kinetic and potential energy"),
     "balance": Quantity(("part",), "mass length squared per time squared", "work of loads, energy that dampers took"),
+    "reaction": Quantity(("motor",), "mass length squared per time squared", "torques of motors"),
     "modified_energy": Quantity((), "mass length squared per time squared", "invariant of the two-step scheme"),
     "rolling_residual": Quantity((), "length per time", "largest |r. - e omega| over the discs"),
 }

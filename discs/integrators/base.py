@@ -49,6 +49,11 @@ class Work:
             work, dissipated = load.power(t, z.hi + (z.lo + move), v)
             self.book(weight * work, weight * dissipated)
 
+    def react(self, load: Load, gained: Float, p: Float) -> None:
+        """Book the work of motors, whose torques changed the momenta by `gained` while the mean momenta were p, both like pi."""
+        rows, discs = np.array([(axle.row, axle.disc) for axle in load.axles]).T
+        self.book(float(np.atleast_2d(gained)[rows - 2, discs] @ np.atleast_2d(p)[rows - 2, discs]), 0.0)
+
 
 NOTHING = np.zeros(4)  # spent by a run without loads
 
@@ -108,7 +113,7 @@ class Integrator(ABC):
     reference : the publication.
     stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
     offers : names of further quantities at frames, see `extras`.
-    takes_loads : whether it can be used with loads.
+    takes_loads, takes_motors : whether it can be used with loads, and with discs whose rate is given.
     adaptive : whether it chooses its own steps; below, h is then the longest step.
     """
 
@@ -119,6 +124,7 @@ class Integrator(ABC):
     stability_limit: ClassVar[float]
     offers: ClassVar[tuple[str, ...]] = ()
     takes_loads: ClassVar[bool] = True
+    takes_motors: ClassVar[bool] = False
     adaptive: ClassVar[bool]
 
     @final

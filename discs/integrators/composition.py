@@ -32,6 +32,7 @@ class Composition(OneStep, ABC):
     fractions: ClassVar[tuple[float, ...]]
     preserves: ClassVar[str] = Midpoint.preserves
     stability_limit: ClassVar[float] = np.inf
+    takes_motors: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.base, Midpoint):

@@ -11,7 +11,7 @@ from discs import checks
 from discs.arrays import Float
 from discs.integrators.base import OneStep, Work
 from discs.integrators.collocation import Collocation, Tableau, tableau
-from discs.skew import Phase, SkewGradient, add
+from discs.skew import Load, Phase, SkewGradient, add
 
 
 class Guide(ABC):
@@ -105,6 +105,7 @@ class Gauss(OneStep, ABC):
     preserves: ClassVar[str] = "energy exactly where V is quadratic; the rolling constraint; reversible"
     reference: ClassVar[str] = "Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3, IV.2, VIII.6"
     stability_limit: ClassVar[float] = np.inf
+    takes_motors: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
@@ -118,13 +119,26 @@ class Gauss(OneStep, ABC):
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         rule = tableau(self.stages)
-        after, v, _, sweep = collocate(system, z, t, h, rule, Common(system, z, h), self.sweeps, self.tolerance)
+        after, v, p, sweep = collocate(system, z, t, h, rule, Common(system, z, h), self.sweeps, self.tolerance)
         for node, b, move, rate in zip(rule.nodes, rule.b, h * _mix(rule.a, v), v, strict=True):
             work.spend(system.load, t + node * h, b * h, z, move, rate)
+        if system.load is not None and system.load.axles:
+            self._react(system, system.load, z, t, h, v, p, work)
         work.gradients += sweep * self.stages
         work.solves += sweep * (rule.real.size + rule.pairs.size)
         work.unconverged += sweep == self.sweeps and self.tolerance > 0
         return after
+
+    def _react(self, system: SkewGradient, load: Load, z: Phase, t: float, h: float, v: Float, p: Float, work: Work) -> None:
+        """Book the work of motors: h b_j c_j tau_j P_j, where P_i = pi_n - h sum_j a_ij (C^T (grad V - f) - c tau)_j."""
+        rule, shape, pulls = tableau(self.stages), system.shape(z.hi, z.lo), []
+        for node, move, rate in zip(rule.nodes, h * _mix(rule.a, v), v, strict=True):
+            moved = system.moved(shape, move)
+            f = load.applied(t + node * h, z.hi + (z.lo + move), rate)
+            pulls.append(system.back(system.basis(moved), system.gradient(moved) - f))
+        gained = _mix(rule.b[:, None] * np.linalg.inv(rule.a), p - z.pi + h * _mix(rule.a, np.array(pulls)))
+        for part, mean in zip(gained, p, strict=True):
+            work.react(load, part, mean)
 
     @cached_property
     def parameters(self) -> "Collocation":

@@ -56,6 +56,7 @@ class Midpoint(OneStep):
     preserves: ClassVar[str] = "energy exactly; the rolling constraint; reversible when converged"
     reference: ClassVar[str] = "Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.2"
     stability_limit: ClassVar[float] = np.inf
+    takes_motors: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)
@@ -84,6 +85,12 @@ class Midpoint(OneStep):
             if (np.abs(move - last).max(axis=1) <= self.tolerance * system.scale).all():
                 break
         work.spend(system.load, t + 0.5 * h, h, z, move, 2 / h * move)
+        if system.load is not None and system.load.axles:
+            c = system.basis(system.moved(shape, move))
+            velocity = system.forward(c, p)
+            f = system.load.applied(t + 0.5 * h, z.hi + (z.lo + move), velocity)
+            pull = system.back(c, system.mean_force(system.secant(shape, h * velocity)) - f)
+            work.react(system.load, 2 * (p - z.pi) + h * pull, p)
         work.gradients += sweep
         work.solves += sweep
         work.unconverged += sweep == self.sweeps and self.tolerance > 0

@@ -5,6 +5,7 @@ from discs.loads.binding import OnRod
 from discs.loads.damping import Damping
 from discs.loads.forces import Force, Slope, Spring, Torque
 from discs.loads.linear import Linear
+from discs.loads.motor import Motor
 from discs.loads.own import Custom, Potential
 from discs.loads.rest import Rest
 from discs.loads.sums import Total, total
@@ -16,6 +17,7 @@ __all__ = [
     "Force",
     "Linear",
     "Load",
+    "Motor",
     "OnRod",
     "Potential",
     "Rest",

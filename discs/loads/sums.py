@@ -6,6 +6,7 @@ import numpy as np
 
 from discs.arrays import Float
 from discs.loads.linear import Linear
+from discs.loads.motor import Held
 from discs.skew import Load
 
 
@@ -57,6 +58,9 @@ def total(loads: tuple[Load, ...]) -> Load | None:
     """One load that is the sum of all, or None; a sum of linear loads is linear, and so has a compiled form."""
     if not loads:
         return None
+    if motors := [load for load in loads if isinstance(load, Held)]:
+        rest = total(tuple(load for load in loads if not isinstance(load, Held)))
+        return Held(tuple(axle for load in motors for axle in load.axles), np.zeros_like(motors[0].damping), rest)
     linear = [load for load in loads if isinstance(load, Linear)]
     if len(linear) == len(loads):
         return Linear(

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from discs import checks
 from discs.arrays import Float
 from discs.integrators.base import Frame
+from discs.loads.motor import Held
 from discs.running.time_loop import March
 
 WANTS = ("velocity", "slope", "contact_force")
@@ -57,14 +58,14 @@ def observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> 
     t = march.step * march.h + tau
     found = march.observe(t, frame)
     if want:
-        found |= _asked(march, frame, t, want)
+        found |= _asked(march, frame, t, want, found)
     if offered:
         found |= march.integrator.extras(march.system, march.memory, march.h)
     return found
 
 
-def _asked(march: March, frame: Frame, t: float, want: tuple[str, ...]) -> dict[str, Any]:
-    """The quantities in `want`, at a frame."""
+def _asked(march: March, frame: Frame, t: float, want: tuple[str, ...], seen: dict[str, Any]) -> dict[str, Any]:
+    """The quantities in `want`, at a frame where those in `seen` are known."""
     system, rate = march.system, frame.rate
     shape = system.shape(frame.hi, frame.lo)
     found: dict[str, Any] = {}
@@ -73,6 +74,9 @@ def _asked(march: March, frame: Frame, t: float, want: tuple[str, ...]) -> dict[
     if "slope" in want:
         found |= dict(zip(("slope_x", "slope_y"), system.slope(shape), strict=True))
     if "contact_force" in want:
-        f = 0.0 if system.load is None else system.load.force(t, frame.hi + frame.lo, rate)
+        f = 0.0 if system.load is None else system.load.applied(t, frame.hi + frame.lo, rate)
+        if isinstance(system.load, Held):
+            f = np.array(f)
+            f[system.load.where] += seen["reaction"]
         found["contact_force"] = system.contact_force(shape, rate, f)
     return found

@@ -7,6 +7,7 @@ import numpy as np
 
 from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory, Tally
+from discs.loads.motor import Held
 from discs.problem import Problem
 from discs.running.rounding import warn_of_lost_digits
 from discs.running.stats import Stats
@@ -212,6 +213,10 @@ class March:
                 work, dissipated = self.work.spent[::2] + self.work.spent[1::2] + frame.spent
                 work += load.driven(t, q) - load.driven(0.0, self.problem.start().hi)
                 found["balance"] = np.array([work, dissipated])
+            if isinstance(load, Held):
+                f = load.applied(t, q, frame.rate)
+                shape = system.shape(frame.hi, frame.lo)
+                found["reaction"] = system.motor_torques(shape, frame.rate, f, load.changes(t, self.problem.duration))
         return found | {"energy": energy, "rolling_residual": slip}
 
     def _plain(self) -> int:

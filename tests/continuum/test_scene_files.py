@@ -50,6 +50,11 @@ torsion = 0.02
 load = "Force"
 y = 0.2
 signal = { name = "table", file = "push.csv" }
+
+[[loads]]
+load = "Motor"
+rate = { name = "sine", amplitude = 0.5, rate = 2.0 }
+at = 4.0
 """
 
 
@@ -57,10 +62,12 @@ def test_loads_in_a_file_are_those_of_the_discs(tmp_path):
     (tmp_path / "scene.toml").write_text(LOADED)
     (tmp_path / "push.csv").write_text("0, 0.0\n1.0, 2.0\n")
     scene = read_scene(tmp_path / "scene.toml")
-    torque, damping, force = scene.loads
+    torque, damping, force, motor = scene.loads
     assert (torque.pattern, torque.at, torque.signal) == (0.3, 0.0, signals.sine(1.0, 2.0))
     assert (damping.rolling, damping.torsion, damping.turning) == (0.1, 0.02, 0.0)
     assert force.signal(0.25) == 0.5
+    assert motor.rate == signals.sine(0.5, 2.0)
+    scene = replace(scene, loads=scene.loads[:3])
     problem, free = lump(scene, 9), lump(replace(scene, loads=()), 9)
     q, v = problem.start().hi, np.ones((3, 9))
     expected = np.zeros((3, 9))

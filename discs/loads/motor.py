@@ -1,0 +1,101 @@
+r"""Motors: discs whose rate of roll or of turning is given.
+
+A motor at disc i adds a torque tau and the condition omega_i = rate(t). Implicit steps impose it where they evaluate forces: the
+row of the disc in their linear system is replaced by a damper of strength HELD on the difference omega_i - rate. All other entries
+of the row vanish beside it in double precision, so elimination gives omega_i to the last bits. The torque follows from the row that
+was replaced, pi'_i = c_i . (f - grad V) + c_i tau.
+
+The midpoint rule and Gauss methods impose the rate inside the steps. At the ends of steps it is as accurate as the method.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from discs import checks
+from discs.arrays import Float
+from discs.loads import signals
+from discs.loads.binding import Discs, OnRod, spread
+from discs.loads.signals import Signal
+from discs.skew import Load
+
+HELD = 1e60  # any other entry of a row is below the rounding of this
+
+
+@dataclass(frozen=True)
+class Motor(OnRod):
+    """A motor or, with rate 0, a brake that holds: the disc nearest to a place rolls at a given rate.
+
+    Parameters
+    ----------
+    rate : rad per time, a number or a function of t. The initial rate of the disc must agree.
+    at : place along the rod.
+    about : "roll", or "turn" for the rate of turning of discs with their own headings.
+    """
+
+    rate: float | Signal
+    at: float
+    about: str = "roll"
+
+    def on(self, chain: Discs) -> "Held":
+        rate: Any = self.rate
+        if not callable(rate):
+            rate = signals.table([0.0], [checks.number("rate of Motor", rate)])
+        return Held((Axle(self._row(chain, self.about), self._disc(chain, self.at), rate),), spread(chain, {}))
+
+
+class Axle(NamedTuple):
+    """A driven angle: its row of q, its disc and its rate."""
+
+    row: int
+    disc: int
+    rate: Signal
+
+
+class Held(Load):
+    """Motors, and another load or None. `force` has dampers in the place of motors, `applied` is the force of the other load.
+
+    Attributes
+    ----------
+    axles : the driven angles. where : (rows, discs), their index in q.
+    """
+
+    def __init__(self, axles: tuple[Axle, ...], nothing: Float, other: Load | None = None) -> None:
+        self.axles, self._other, self._nothing = axles, other, nothing
+        self.where = np.array([axle.row for axle in axles]), np.array([axle.disc for axle in axles])
+        self.damping, self.stiffness = (nothing if other is None else getattr(other, name) for name in ("damping", "stiffness"))
+        self.damping = self.damping.copy()
+        self.damping[self.where] += HELD
+        self.viscosity = None if other is None else other.viscosity
+
+    def rates(self, t: float) -> Float:
+        """The given rates at a time, (motors,)."""
+        return np.array([signals.values(axle.rate, np.array([t]), "Motor")[0] for axle in self.axles])
+
+    def changes(self, t: float, duration: float) -> Float:
+        """Rates of change of the given rates, (motors,), by differences of second order within the duration."""
+        step = 1e-5 * duration
+        times = np.clip(t - step, 0.0, duration - 2 * step) + step * np.arange(3)
+        x = (t - times[1]) / step
+        values = np.array([signals.values(axle.rate, times, "Motor") for axle in self.axles])
+        found: Float = values @ np.array([x - 0.5, -2 * x, x + 0.5]) / step
+        return found
+
+    def applied(self, t: float, q: Float, v: Float) -> Float:
+        return self._nothing if self._other is None else self._other.force(t, q, v)
+
+    def force(self, t: float, q: Float, v: Float) -> Float:
+        found = np.array(self.applied(t, q, v), dtype=float)
+        found[self.where] += HELD * (self.rates(t) - v[self.where])
+        return found
+
+    def potential(self, t: float, q: Float) -> float:
+        return 0.0 if self._other is None else self._other.potential(t, q)
+
+    def driven(self, t: float, q: Float) -> float:
+        return 0.0 if self._other is None else self._other.driven(t, q)
+
+    def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
+        """Without that of the motors, see `discs.integrators.base.Work.react`."""
+        return (0.0, 0.0) if self._other is None else self._other.power(t, q, v)

@@ -1,0 +1,121 @@
+"""Motors and held discs: against multipliers, closed forms and the balance of energy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discs import Chain, Midpoint, Problem, State, simulate
+from discs.loads import Damping, Motor, Slope, Torque, signals
+from discs.mechanics.lagrange import frames as coordinates
+from discs.mechanics.lagrange import lagrange_dalembert
+from tests.conftest import models, uneven
+from tests.discs.test_loads import KINDS
+
+RATE = 1.3
+
+
+def driven(model, n: int = 6) -> Problem:
+    """An uneven chain with loads, one disc driven and an end held; with own headings a third one turns."""
+    problem = uneven(n, model)
+    omega = np.array(problem.initial.omega)
+    omega[2], omega[-1] = 0.4, 0.0
+    motors = [Motor(lambda t: 0.4 + 0.5 * np.sin(RATE * t), 2 * problem.chain.k), Motor(0.0, (n - 1) * problem.chain.k)]
+    phi_rate = problem.initial.phi_rate
+    if model.law == "steered":
+        phi_rate = np.array(phi_rate) * np.ones(n)
+        phi_rate[1] = 0.2
+        motors.append(Motor(lambda t: 0.2 - 0.3 * t, problem.chain.k, about="turn"))
+    loads = (*motors, Slope(0.3, -0.2), Damping(rolling=0.2, torsion=0.1), Torque(0.3, signals.sine(1.0, 2.0)))
+    return replace(problem, initial=replace(problem.initial, omega=omega, phi_rate=phi_rate), loads=loads)
+
+
+def by_multipliers(problem: Problem):
+    """End and multipliers, those of the driven angles last: another formulation, another method."""
+    n, system = problem.chain.n, lagrange_dalembert(replace(problem, loads=()), dense=True)
+    axles, others = problem.system.load.axles, replace(problem, loads=problem.loads[-3:]).system.load
+    rows = np.zeros((len(axles), len(system.names)))
+    for row, axle in zip(rows, axles, strict=True):
+        row[axle.row * n + axle.disc] = 1
+    system = replace(system, applied=lambda t, q, v: others.force(t, q.reshape(-1, n), v.reshape(-1, n)).ravel())
+    names = tuple(f"motor {i}" for i in range(len(axles)))
+    system = system.also(rows, names, lambda t, q: np.array([float(axle.rate(t)) for axle in axles]))
+    found = system.integrate(*coordinates(problem), [0.0, 1.0], rtol=1e-9)
+    return found.q[-1].reshape(-1, n), found.multipliers[-1][: 2 * n].reshape(2, n), found.multipliers[-1][2 * n :]
+
+
+@models([KINDS[0], KINDS[1], KINDS[4]])
+def test_motors_move_discs_as_the_saddle_point_says(model):
+    problem = driven(model)
+    q, ground, torque = by_multipliers(problem)
+    for method, dt, close, near in (("midpoint", 0.01, 1e-3, 0.05), ("gauss6", 0.05, 3e-6, 2e-3)):
+        run = simulate(problem, method, dt, 2, ("contact_force",), progress=False)
+        np.testing.assert_allclose([getattr(run, row)[-1] for row in problem.system.rows], q, atol=close, err_msg=method)
+        np.testing.assert_allclose(run.reaction[-1], torque, atol=near, err_msg=method)
+        np.testing.assert_allclose(run.contact_force[-1], ground, atol=near, err_msg=method)
+        off = run.energy - problem.energy() - run.work + run.dissipated
+        assert abs(off).max() < (1e-11 if method == "midpoint" or problem.system.quadratic else 1e-6) * abs(run.energy).max()
+        assert run.stats["engine"] == "plain"
+        assert run.reaction.shape == (2, len(problem.system.load.axles))
+
+
+def test_the_row_of_a_motor_is_replaced_to_the_last_bits():
+    """Its angle is the midpoint sum of its rate; a held disc does not turn at all."""
+    problem = driven(KINDS[0])
+    run = simulate(problem, "midpoint", 0.05, 2, progress=False)
+    t = 0.05 * (np.arange(20) + 0.5)
+    turned = 0.05 * np.sum(0.4 + 0.5 * np.sin(RATE * t))
+    assert run.theta[-1, 2] - problem.initial.theta[2] == pytest.approx(turned, rel=1e-14)
+    assert run.theta[-1, -1] == problem.initial.theta[-1]
+
+
+def test_a_motor_pulls_a_row_of_discs_steadily():
+    """Without springs a driven disc accelerates alone: its torque is inertia times acceleration, its work the kinetic energy."""
+    chain = Chain(
+        n=5, length=2.0, density=1.3, spin_inertia=0.6, torsion_stiffness=0.0, bending_stiffness=0.0, radius=0.7, rolling="unit"
+    )
+    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 2.0, (Motor(lambda t: 0.6 * t, 1.0),))
+    run = simulate(replace(problem, initial=problem.initial), Midpoint(tolerance=1e-15), 0.01, 5, progress=False)
+    inertia = (0.6 + 1.3 * 0.7**2) * chain.w[2]
+    moved = run.omega[:, 2]
+    np.testing.assert_allclose(moved, 0.6 * run.t, atol=1e-12)
+    np.testing.assert_allclose(run.work, 0.5 * inertia * moved**2, rtol=1e-6, atol=1e-12)
+
+
+def test_a_held_end_reacts_with_the_moment_of_the_rod():
+    """A rod at rest, twisted evenly and held at both ends, stays; the torques are beta times the twist."""
+    problem = uneven(7, KINDS[0], equal=True)
+    chain = problem.chain
+    state = State(chain.s, 0 * chain.s, 0.3 * chain.s)
+    run = simulate(
+        replace(problem, initial=state, loads=(Motor(0, 0.0), Motor(0, chain.length))), "midpoint", 0.05, 3, progress=False
+    )
+    np.testing.assert_allclose(run.reaction, 0.9 * 0.3 * np.array([[-1, 1]] * 3), rtol=1e-9)
+    np.testing.assert_allclose(run.work, 0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda p: (Motor(0.5, 0.0),), "Motor: its rate at t = 0 must be the initial omega of its disc 0, 0.5.*; got 0.4"),
+        (lambda p: (Motor(0.5, 9.0),), "at of Motor must be on the rod"),
+        (lambda p: (Motor(0.5, 0.0, about="turn"),), "Motor: about='turn' is for discs with headings"),
+        (lambda p: (Motor(0.5, 0.0), Motor(0.5, 0.1)), "Motor: disc 0 has two motors"),
+        (lambda p: (Motor(lambda t: 0.5 / (1 - t) if t < 1 else np.inf, 0.0),), "Motor: the signal .* got inf at t = 1"),
+        (lambda p: (Motor("fast", 0.0),), "rate of Motor must be a finite number"),
+    ],
+)
+def test_motors_that_cannot_be_are_refused(change, words):
+    problem = uneven(7, KINDS[0])
+    omega = np.array(problem.initial.omega)
+    if "got 0.4" in words:
+        omega[0], words = 0.7, words.replace("0.5.*; got 0.4", "0.7; got 0.5")
+    with pytest.raises(ValueError, match=words):
+        replace(problem, initial=replace(problem.initial, omega=omega), loads=change(problem))
+
+
+@pytest.mark.parametrize("method", ["rk4", "DOP853"])
+def test_methods_that_take_no_motors_say_so(method):
+    problem = uneven(7, KINDS[0])
+    with pytest.raises(ValueError, match=f"'{method}' does not take motors; take an implicit method"):
+        simulate(replace(problem, loads=(Motor(0.5, 0.0),)), method, 0.01, progress=False)
