@@ -9,6 +9,7 @@ from continuum.rod import Rod, Scene, SteeredRod
 from discs import checks
 from discs.arrays import Float
 from discs.chains.twist import PAPER, Parameters, twisted
+from discs.loads import Rest
 
 LAW = ("curvature", "stretch_stiffness")
 
@@ -44,9 +45,13 @@ def steered_rod(
     heading_inertia: float = 0.25,
     duration: float = 4.5,
     twist: float = 0.5,
+    mounting_angle: float = 0.0,
     **parameters: Unpack[Parameters],
 ) -> Scene:
-    """The paper's twist for a rod whose sections have headings of their own, at rest with phi = 0; see `SteeredRod`."""
+    """The paper's twist for a rod whose sections have headings of their own, at rest with phi = 0; see `SteeredRod`.
+
+    With a `mounting_angle` the rod is at rest with phi = mounting_angle, by `discs.loads.Rest`, at pi/2 a wheeled snake.
+    """
     for name in parameters:
         checks.choice("rod parameter", name, PAPER)
     rod = SteeredRod(
@@ -55,8 +60,10 @@ def steered_rod(
         shear_stiffness=shear_stiffness,
         heading_inertia=heading_inertia,
     )
-    initial = partial(_steered, length=rod.length, amplitude=np.pi * checks.number("twist", twist))
-    return Scene(rod=rod, initial=initial, duration=duration, rolling="unit", name="steered rod")
+    psi = checks.number("mounting_angle", mounting_angle)
+    initial = partial(_steered, length=rod.length, amplitude=np.pi * checks.number("twist", twist), phi=psi)
+    loads = (Rest(mounting_angle=psi),) if psi else ()
+    return Scene(rod=rod, initial=initial, duration=duration, rolling="unit", name="steered rod", loads=loads)
 
 
 def rolling_rod(
@@ -95,8 +102,8 @@ def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float =
     return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, closed=True, name="breathing ring")
 
 
-def _steered(s: Float, length: float, amplitude: float) -> tuple[Float, ...]:
-    return (*twisted(s, length, amplitude), 0 * s, 0 * s)
+def _steered(s: Float, length: float, amplitude: float, phi: float) -> tuple[Float, ...]:
+    return (*twisted(s, length, amplitude), np.full_like(s, phi), 0 * s)
 
 
 def _rolling(s: Float, q: float, radius: float, omega: float, amplitude: float) -> tuple[Float, Float, Float, Float]:

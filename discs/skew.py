@@ -68,6 +68,7 @@ class Load(ABC):
     viscosity : (columns, n + 1), of the part -B^T (viscosity) B v of f in the rows from theta on, where B v is the difference of
         neighbours. Link j is before disc j; on a ring links 0 and n are the same, at free ends they have 0. None for none.
     axles : driven angles, of motors; see `discs.loads.motor`.
+    section : (2, n_links), rest stretch and shear of links of discs with their own headings, which become part of V; None for none.
     conservative : whether f = -grad U with U = `potential`; then the energy, U included, is conserved.
     least : a lower bound of U, used to detect blow-up; -inf if none is known.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
@@ -77,6 +78,7 @@ class Load(ABC):
     stiffness: Float
     viscosity: Float | None = None
     axles: tuple[Any, ...] = ()
+    section: Float | None = None
     conservative: bool = False
     least: float = -np.inf
 

@@ -139,7 +139,10 @@ class SteeredSystem(RollingDiscs):
 
     def _strain(self, d: Float, middle: Float) -> Float:
         cos, sin, k = np.cos(middle), np.sin(middle), self._k
-        return np.array([(cos * d[0] + sin * d[1]) / k - 1, (cos * d[1] - sin * d[0]) / k, d[2] / k, d[3] / k])
+        found = np.array([(cos * d[0] + sin * d[1]) / k - 1, (cos * d[1] - sin * d[0]) / k, d[2] / k, d[3] / k])
+        if self.load is not None and self.load.section is not None:
+            found[:2] -= self.load.section
+        return found
 
     def potential(self, shape: Links) -> float:
         return 0.5 * float((self._stiffness * self._strain(shape.d, shape.middle) ** 2).sum())

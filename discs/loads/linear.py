@@ -43,6 +43,7 @@ class Linear(Load):
     offset : energy.
     strain : rest strains of springs, times the root of their stiffness; any shape.
     drives : the parts that depend on time.
+    section : see `Load`; the load then has no compiled form.
     floor : a lower bound of the potential, or of its sum with that of the springs; None for the one where stiffness q = constant.
 
     Raises
@@ -57,6 +58,7 @@ class Linear(Load):
     offset: float = 0.0
     strain: Any = 0.0
     drives: tuple[Drive, ...] = ()
+    section: Any = None
     floor: float | None = None
 
     def __post_init__(self) -> None:
@@ -112,6 +114,8 @@ class Linear(Load):
 
     @cached_property
     def parameters(self) -> Any:
+        if self.section is not None:
+            return None
         from discs.kernels import load
 
         links = np.empty((0, 0)) if self.viscosity is None else self.viscosity

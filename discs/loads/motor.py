@@ -67,7 +67,7 @@ class Held(Load):
         self.damping, self.stiffness = (nothing if other is None else getattr(other, name) for name in ("damping", "stiffness"))
         self.damping = self.damping.copy()
         self.damping[self.where] += HELD
-        self.viscosity = None if other is None else other.viscosity
+        self.viscosity, self.section = (None if other is None else getattr(other, name) for name in ("viscosity", "section"))
 
     def rates(self, t: float) -> Float:
         """The given rates at a time, (motors,)."""

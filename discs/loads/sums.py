@@ -19,7 +19,8 @@ class Total(Load):
     def __post_init__(self) -> None:
         for name in ("damping", "stiffness"):
             object.__setattr__(self, name, np.sum([getattr(load, name) for load in self.loads], axis=0))
-        object.__setattr__(self, "viscosity", viscosity(self.loads))
+        for name in ("viscosity", "section"):
+            object.__setattr__(self, name, _present(self.loads, name))
         object.__setattr__(self, "conservative", all(load.conservative for load in self.loads))
         object.__setattr__(self, "least", sum(load.least for load in self.loads))
 
@@ -38,9 +39,9 @@ class Total(Load):
         return found
 
 
-def viscosity(loads: tuple[Load, ...] | list[Linear]) -> Float | None:
-    """The sum of the viscosities of loads, None if there is none."""
-    present = [load.viscosity for load in loads if load.viscosity is not None]
+def _present(loads: tuple[Load, ...] | list[Linear], name: str) -> Float | None:
+    """The sum of an attribute of loads, None if none has it."""
+    present = [value for load in loads if (value := getattr(load, name)) is not None]
     found: Float | None = np.sum(present, axis=0) if present else None
     return found
 
@@ -67,7 +68,8 @@ def total(loads: tuple[Load, ...]) -> Load | None:
             constant=np.sum([load.constant for load in linear], axis=0),
             damping=np.sum([load.damping for load in linear], axis=0),
             stiffness=np.sum([load.stiffness for load in linear], axis=0),
-            viscosity=viscosity(linear),
+            viscosity=_present(linear, "viscosity"),
+            section=_present(linear, "section"),
             offset=sum(load.offset for load in linear),
             strain=sum(load.strain for load in linear),
             drives=tuple(drive for load in linear for drive in load.drives),

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
 
+from compare import lump
+from continuum import steered_rod
 from discs import Chain, Midpoint, Problem, State, SteeredChain, simulate
 from discs.integrators import METHODS
 from discs.kernels import protocol as do
@@ -210,6 +212,43 @@ def test_the_energy_of_rest_shapes_is_that_of_the_strain_from_rest():
     assert replace(problem, loads=loads).energy() == pytest.approx(problem.energy() + change, rel=1e-13)
 
 
+def test_rest_stretch_and_shear_are_those_of_the_energy():
+    """V against its formula, the force against differences of it, and energy over midpoint steps."""
+    problem = uneven(6, Model("ring", "steered"))
+    stretch, shear, psi = 0.1, np.linspace(-0.1, 0.2, 6), 0.7
+    chain = problem.chain
+
+    def energy(q):
+        total = problem.system.potential(problem.system.shape(q))
+        d = np.roll(q, -1, axis=1) - q
+        d[3, -1] += 2 * np.pi
+        line = (d[0] + 1j * d[1]) / chain.k * np.exp(-1j * (q[3] + 0.5 * d[3]))
+        off = line - np.exp(-1j * psi) - stretch - 1j * shear
+        for part, stiff in (((line - 1).real, -chain.stretch_stiffness), ((line - 1).imag, -chain.shear_stiffness)):
+            total += 0.5 * chain.k * np.sum(stiff * part**2)
+        return total + 0.5 * chain.k * np.sum(chain.stretch_stiffness * off.real**2 + chain.shear_stiffness * off.imag**2)
+
+    own = replace(problem, loads=(Rest(stretch=stretch, shear=shear), Rest(mounting_angle=psi)))
+    system, q, rng = own.system, own.start().hi, np.random.default_rng(2)
+    assert system.potential(system.shape(q)) == pytest.approx(energy(q), rel=1e-13)
+    move = rng.normal(size=q.shape)
+    slope = (energy(q + 1e-5 * move) - energy(q - 1e-5 * move)) / 2e-5
+    assert np.vdot(system.gradient(system.shape(q)), move) == pytest.approx(slope, rel=1e-8)
+    run = simulate(own, Midpoint(tolerance=1e-14), 0.01, 4, progress=False)
+    assert abs(run.energy - run.energy[0]).max() < 1e-11 * run.energy[0]
+    assert (run.stats["engine"], own.conserves) == ("plain", True)
+
+
+def test_a_snake_with_wheels_along_its_line_rolls_along_it():
+    psi = np.pi / 2
+    problem = lump(steered_rod(mounting_angle=psi, twist=0.0, radius=0.7), 6)
+    problem = replace(problem, initial=replace(problem.initial, omega=1.3 * np.ones(6)))
+    run = simulate(problem, "midpoint", 0.05, 3, progress=False)
+    np.testing.assert_allclose(run.x, problem.chain.s - 0.7 * 1.3 * run.t[:, None], atol=1e-12)
+    np.testing.assert_allclose(run.y, 0, atol=1e-12)
+    np.testing.assert_allclose(run.phi, psi, atol=1e-12)
+
+
 def test_a_driven_rest_shape_does_the_work_of_its_links():
     """-int S (a - e) e' dt over the motion, by quadrature of fine frames; also the work of a cycle of an actuator."""
     problem = replace(uneven(7, KINDS[0]), loads=(Rest(twist=0.7, signal=signals.sine(1.0, 5.0)),))
@@ -253,6 +292,7 @@ def test_the_balance_stays_exact_over_many_steps(engine, kernels_as_python):
         (lambda p: Damping(torsion=np.ones(7)), r"torsion of Damping must be a number or an array of shape \(6,\)"),
         (lambda p: Damping(bending=0.1), "Damping: bending is for discs with headings of their own"),
         (lambda p: Rest(curvature=0.1), "Rest: curvature is for discs with headings of their own"),
+        (lambda p: Rest(mounting_angle=0.1), "Rest: mounting_angle is for discs with headings of their own"),
         (lambda p: Torque(1.0, about="turn"), "Torque: about='turn' is for discs with headings"),
         (lambda p: Torque(1.0, about="pitch"), "about of Torque must be one of 'roll', 'turn'"),
         (lambda p: Torque(1.0, at=3.2), "at of Torque must be on the rod, from 0 to 3.1; got 3.2"),
