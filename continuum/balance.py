@@ -83,10 +83,13 @@ def balances(
 
     Raises
     ------
-    ValueError : for another bending law, too few frames or nodes, or a motion of the free rod without velocities and tension.
+    ValueError : for another bending law, a run with loads, too few frames or nodes, or a motion of the free rod without velocities
+        and tension.
     """
     if isinstance(rod, SteeredRod) or not isinstance(rod, Rod) or rod.curvature != "linear":
         raise ValueError(f"balances need a Rod with curvature='linear'; got {rod!r}")
+    if run.problem is not None and run.problem.loads:
+        raise ValueError("balances are those of a rod without loads; got a run with some")
     frames, nodes = run.x.shape
     if frames < 3 or nodes <= DEGREE:
         raise ValueError(f"balances need at least 3 frames and {DEGREE + 1} nodes; got {frames} and {nodes}")

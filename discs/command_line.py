@@ -136,6 +136,10 @@ def summary(run: Solution | Trajectory) -> str:
     done += [f"{stats['seconds']:.3g} s"] if "seconds" in stats else []
     lines.append(f"method {printable(stats.get('method'))}" + (f": {', '.join(done)}" if done else ""))
     lines.append(f"energy {run.energy[0]:.9g}, changed by {drift:.1e} at most")
+    if isinstance(run, Solution) and run.balance is not None:
+        off = run.energy - run.work + run.dissipated
+        balanced = f"balanced to {np.abs(off - off[0]).max():.1e}"
+        lines.append(f"work of loads {run.work[-1]:.6g}, taken by dampers {run.dissipated[-1]:.6g}, {balanced}")
     if isinstance(run, Solution) and run.rolling_residual is not None:
         lines.append(f"largest slip {run.rolling_residual.max():.1e}")
     lines += [f"not to be trusted: {doubt}" for doubt in doubts(stats)]

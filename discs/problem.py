@@ -14,7 +14,7 @@ from discs.chains.rolling_discs import RollingDiscs
 from discs.chains.slaved import SlavedSystem
 from discs.chains.steered import SteeredSystem
 from discs.loads import Linear, OnRod, signals, total
-from discs.loads.motor import Held
+from discs.loads.motor import Held, Motor
 from discs.skew import Load, Phase
 
 
@@ -208,7 +208,10 @@ class Problem:
 
     def energy(self, state: State | None = None) -> float:
         """Kinetic and potential energy of a state, the initial one by default; potentials of loads are part of it."""
-        return self._energy if state is None else Problem(self.chain, state, self.duration, self.loads)._energy
+        if state is None:
+            return self._energy
+        loads = tuple(load for load in self.loads if not isinstance(load, Motor))  # they have no energy, but a rate at t = 0
+        return Problem(self.chain, state, self.duration, loads)._energy
 
     @cached_property
     def _energy(self) -> float:

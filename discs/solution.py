@@ -171,9 +171,9 @@ class Solution(Result):
     def state(self, frame: int = -1) -> State:
         """The state at a frame, from which another run can start.
 
-        `Problem(run.problem.chain, run.state(), duration)` continues from the last frame, for every chain. The bits differ from
-        those of one longer run, as frames do not hold the memory of a method; `simulate(checkpoint=)` continues to the same bits.
-        For a field it is the state of the nodes.
+        `replace(run.problem, initial=run.state(), duration=...)` continues from the last frame, for every chain; signals of loads
+        begin at t = 0 again. The bits differ from those of one longer run, as frames do not hold the memory of a method;
+        `simulate(checkpoint=)` continues to the same bits. For a field it is the state of the nodes.
 
         Parameters
         ----------

@@ -138,12 +138,14 @@ def profiles(run: Solution, name: str = "theta", ax: Axes | None = None, instant
 
 
 def energy_error(run: Solution, ax: Axes | None = None) -> Axes:
-    """Change of the energy against time, relative to the initial energy unless that is zero."""
+    """Change of the energy against time, less work and dissipation, relative to the initial energy unless that is zero."""
     ax = given_or_new(ax, 5.4, 4.0)
     start = float(run.energy[0])
-    ax.plot(run.t, (run.energy - start) / (start or 1.0), color=BLUE)
+    off = run.energy - run.work + run.dissipated
+    ax.plot(run.t, (off - off[0]) / (start or 1.0), color=BLUE)
     ax.set_xlabel(LABEL["t"])
-    ax.set_ylabel("(E − E₀)/E₀" if start else "E")
+    change = "E − E₀" if run.balance is None else "E − E₀ − work + dissipated"
+    ax.set_ylabel(f"({change})/E₀" if start else change)
     ax.set_title(f"energy, E₀ = {start:.6g}", fontsize="medium")
     ax.grid(alpha=0.3)
     return ax

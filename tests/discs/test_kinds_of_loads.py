@@ -7,11 +7,13 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 from compare import lump
-from continuum import steered_rod
+from continuum import steered_rod, untwisting_rod
+from continuum.balance import balances
 from discs import Chain, Midpoint, Problem, State, SteeredChain, simulate
+from discs.command_line import summary
 from discs.integrators import METHODS
 from discs.kernels import protocol as do
-from discs.loads import Custom, Damping, Force, Linear, Potential, Rest, Slope, Spring, Torque, signals
+from discs.loads import Custom, Damping, Force, Linear, Motor, Potential, Rest, Slope, Spring, Torque, signals
 from tests.conftest import Model, models, uneven
 from tests.discs.test_loads import KINDS, by_discs, by_multipliers
 
@@ -129,6 +131,25 @@ def test_frames_do_not_change_work():
     few, many = (simulate(problem, "midpoint", 0.03, f, progress=False, engine="plain") for f in ([0.31, 1.0], 57))
     assert few.work[-1] == many.work[-1]
     assert few.dissipated[-1] == many.dissipated[-1]
+
+
+def test_summaries_and_pictures_speak_of_the_balance():
+    problem = uneven(7, KINDS[0])
+    problem = replace(problem, loads=every(problem))
+    run = simulate(problem, "midpoint", 0.05, 5, progress=False, engine="plain")
+    assert "taken by dampers" in summary(run)
+    assert "balanced to" in summary(run)
+    (ax,) = run.plot("energy")
+    assert abs(ax.lines[0].get_ydata()).max() < 1e-12
+    with pytest.raises(ValueError, match="balances are those of a rod without loads"):
+        balances(untwisting_rod().rod, run, "field")
+
+
+def test_the_energy_of_another_state_needs_no_motor():
+    problem = uneven(7, KINDS[0])
+    driven = replace(problem, loads=(Motor(float(problem.initial.omega[2]), problem.chain.s[2]), Slope(0.1)))
+    other = replace(problem.initial, omega=0.3)
+    assert driven.energy(other) == replace(problem, initial=other, loads=(Slope(0.1),)).energy()
 
 
 def one_row(loads, n: int = 5, duration: float = 2.0, **parameters) -> Problem:
