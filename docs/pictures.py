@@ -1,4 +1,4 @@
-"""Make the pictures of docs/pictures.md, motion.png, vakonomic.png and rod.gif: `python docs/pictures.py`, half a minute.
+"""Make the pictures of docs/pictures.md, loads.png, motion.png, vakonomic.png and rod.gif: `docs/pictures.py`, 30 s.
 
 The page's picture needs chromium. convergence.png, energy.png and limits.png are the main job's; `python -m continuum.figures
 docs/images` makes those of the field.
@@ -8,15 +8,19 @@ import shutil
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
+from matplotlib.figure import Figure
 from PIL import Image
 
 from compare import figures, lump
 from continuum import solve, untwisting_rod
 from discs import simulate
+from discs.loads import Damping, Torque, signals
 from discs.pictures import figures as of_discs
 from discs.pictures.animation import Stage
+from discs.pictures.style import BLUE, ORANGE
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -40,6 +44,26 @@ def shot(page: Path, to: Path, t: float) -> None:
         browser.quit()
 
 
+def loads() -> Figure:
+    """A driven rod and a braked one: where they move, and the balance of energy."""
+    figure = Figure(figsize=(9.6, 6.8), layout="constrained")
+    still, twisted = lump(untwisting_rod(twist=0.0, duration=9.0), n=33), lump(untwisting_rod(duration=18.0), n=33)
+    push = Torque(1.0, signal=signals.smooth(0.0, 3.0), at=0.0)
+    both = (
+        ("pushed: a torque on the first disc", still, push, "work", "work of the torque"),
+        ("braked: viscous springs", twisted, Damping(torsion=0.3), "dissipated", "dissipated"),
+    )
+    for (left, right), (title, problem, load, name, words) in zip(figure.subplots(2, 2), both, strict=True):
+        run = simulate(replace(problem, loads=(load,)), "midpoint", 0.01, frames=91, progress=False)
+        run.plot_motion(left)
+        left.set_title(title)
+        right.plot(run.t, run.energy, color=BLUE, label="energy")
+        right.plot(run.t, getattr(run, name), "--", color=ORANGE, label=words)
+        right.set(xlabel="t", title="the balance")
+        right.legend()
+    return figure
+
+
 def main() -> None:
     scene = untwisting_rod()
     run = simulate(lump(scene, n=32, ends="consistent"), dt=0.02, frames=91)
@@ -48,6 +72,7 @@ def main() -> None:
     Image.fromarray(Stage(run, size=(960, 540)).picture(-1)).convert("RGB").save(IMAGES / "movie.png", optimize=True)
     figures.motion(solve(scene, tol=1e-3, frames=5), scene).savefig(IMAGES / "motion.png", dpi=110)
     of_discs.vakonomic().savefig(IMAGES / "vakonomic.png", dpi=110)
+    loads().savefig(IMAGES / "loads.png", dpi=100)
     if not shutil.which("chromedriver"):
         sys.exit("no chromedriver: view.png is not made")
     few = simulate(lump(scene, n=17), dt=0.02, frames=91)
