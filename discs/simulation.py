@@ -200,8 +200,11 @@ def _run(
     if end / h > MOST_STEPS:
         raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")
     system = problem.system
-    if problem.loads and not integrator.takes_loads:
-        raise ValueError(f"{integrator.name!r} does not take loads; take a method that does, as 'midpoint'")
+    if not integrator.takes_loads and not problem.conserves:
+        raise ValueError(
+            f"{integrator.name!r} takes loads that are part of the energy only, as Slope, Spring, or Rest without a signal; take a "
+            "method that takes all, as 'midpoint'"
+        )
     if system.load is not None and system.load.axles and not integrator.takes_motors:
         raise ValueError(f"{integrator.name!r} does not take motors; take an implicit method with fixed steps, as 'midpoint'")
     offered = set(want) & set(integrator.offers)

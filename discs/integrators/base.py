@@ -113,7 +113,8 @@ class Integrator(ABC):
     reference : the publication.
     stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
     offers : names of further quantities at frames, see `extras`.
-    takes_loads, takes_motors : whether it can be used with loads, and with discs whose rate is given.
+    takes_loads : whether it takes all loads, or only those that are part of the energy.
+    takes_motors : whether it takes discs whose rate is given.
     adaptive : whether it chooses its own steps; below, h is then the longest step.
     """
 
@@ -227,7 +228,7 @@ class FixedStep(Integrator):
         """
         import discs.kernels.driver as driver
 
-        if system.load is not None:
+        if system.load is not None and not system.load.conservative:
             starts = t + h * np.arange(steps + 1.0)
             times = np.add.outer(starts, h * np.array([0.0, *self.parameters.nodes]))
             chain = chain._replace(load=system.load.timed(times.ravel(), abs(h)))

@@ -39,8 +39,8 @@ class Leapfrog(FixedStep):
     the bilinear form. (Multiply by q_{n+1} - q_{n-1}, which A annihilates.) It needs h <= k^2/2 sqrt(rho/K). It has a parasitic
     mode: the part of v that violates the constraint can change its sign every step, and grow.
 
-    The first move and frames between steps are computed by a Runge-Kutta step. Velocities at frames are the central
-    differences (q_{n+1} - q_{n-1})/2h.
+    Loads that are part of the energy are forces like those of springs. The first move and frames between steps are computed by a
+    Runge-Kutta step. Velocities at frames are the central differences (q_{n+1} - q_{n-1})/2h.
     """
 
     name: ClassVar[str] = "leapfrog"
@@ -61,7 +61,10 @@ class Leapfrog(FixedStep):
         hi, lo = add(memory.hi, memory.lo, memory.next)
         shape = system.shape(hi, lo)
         c = system.basis(shape)
-        free = 2 * system.weights * memory.next - h * h * system.gradient(shape)  # M (q* - q_{n-1})
+        gradient = system.gradient(shape)
+        if system.load is not None:
+            gradient = gradient - system.load.force(t + h, hi + lo, 0 * hi)
+        free = 2 * system.weights * memory.next - h * h * gradient  # M (q* - q_{n-1})
         work.gradients += 1
         return TwoStep(hi, lo, memory.next, system.forward(c, system.back(c, free)) - memory.next)
 
@@ -96,6 +99,10 @@ class Leapfrog(FixedStep):
     def extras(self, system: RollingDiscs, memory: TwoStep, h: float) -> dict[str, float]:
         shape = system.shape(memory.hi, memory.lo)
         polarised = system.polarised(shape, system.moved(shape, memory.next))
+        if (load := system.load) is not None:  # of a quadratic U the same bilinear form
+            q = memory.hi + memory.lo
+            ends = load.potential(0.0, q) + load.potential(0.0, q + memory.next)
+            polarised += 2 * load.potential(0.0, q + 0.5 * memory.next) - 0.5 * ends
         return {"modified_energy": self.kinetic(system, memory, h) + polarised}
 
 
@@ -135,6 +142,7 @@ def _step(method: Central, chain: Parameters, work: Any, room: Room, before: Two
         for k in range(to.size):
             to[k] = method.weight * w[k] * move[k] - h * h * to[k]
     back(c, g, p)
+    do.push(chain.load, after, t + h, still, c, p, h * h, p)
     copy(before.next, after.last)
     forward(c, p, after.next)
     for row in range(g.shape[0]):

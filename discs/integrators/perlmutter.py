@@ -55,7 +55,10 @@ class McLachlanPerlmutter(OneStep):
         half, move = 0.5 * h * v, h * v
         middle = system.moved(shape, half)
         c = system.basis(middle)
-        pull = system.back(c, system.weights * v - h * system.gradient(middle))
+        gradient = system.gradient(middle)
+        if system.load is not None:
+            gradient = gradient - system.load.force(t + 0.5 * h, z.hi + (z.lo + half), v)
+        pull = system.back(c, system.weights * v - h * gradient)
         for sweep in range(1, self.sweeps + 1):  # noqa: B007, counted below
             after = system.basis(system.moved(shape, move))
             pi = pull / system.back(c, system.weights * system.forward(after, np.ones_like(pull)))
@@ -137,6 +140,7 @@ def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after
         for k in range(to.size):
             to[k] = w[k] * rate[k] - h * to[k]
     back(c, g, pull)
+    do.push(chain.load, before, t + 0.5 * h, half, c, before.pi, h, pull)
     sweep, moved = 0, np.inf
     while unsettled(method, sweep, moved):
         if interrupted():

@@ -125,6 +125,26 @@ def test_energy_is_work_less_dissipation(model, engine, kernels_as_python):
     assert run.stats["engine"] == engine
 
 
+@models([KINDS[0], KINDS[2]])
+@pytest.mark.parametrize("method", ["leapfrog", "mclachlan-perlmutter"])
+def test_explicit_schemes_take_loads_that_are_part_of_the_energy(model, method, kernels_as_python):
+    """Against gauss6, at order 2; the modified energy with polarised potentials of loads is exact."""
+    problem = replace(uneven(6, model), loads=(Slope(0.5, -0.8), Spring(lambda s: s, 0.3, 1.5), Rest(twist=0.6)))
+    exact = simulate(problem, "gauss6", 0.02, 2, progress=False, engine="plain")
+    want = ("modified_energy",) if method == "leapfrog" else ()
+    for engine in ("compiled", "plain"):
+        off = []
+        for dt in (0.01, 0.005):
+            run = simulate(problem, method, dt, 5, want, progress=False, engine=engine)
+            off.append(max(abs(getattr(run, row)[-1] - getattr(exact, row)[-1]).max() for row in problem.system.rows))
+        assert off[0] / off[1] == pytest.approx(4, abs=0.6)
+        assert run.stats["engine"] == engine
+        if want:
+            assert abs(run.modified_energy - run.modified_energy[0]).max() < 1e-12 * abs(run.modified_energy[0])
+    with pytest.raises(ValueError, match=f"'{method}' takes loads that are part of the energy only"):
+        simulate(replace(problem, loads=(Damping(0.1),)), method, 0.005, progress=False)
+
+
 def test_frames_do_not_change_work():
     problem = uneven(7, KINDS[0])
     problem = replace(problem, loads=every(problem))
