@@ -2,7 +2,8 @@
 
 Stages and sweeps are those of `discs.integrators.gauss`. Three things differ, because steps are long here and matrices are full:
 
-1. The common C is that of an earlier step. Its matrix is stored by its eigenvectors, which serve for every length of step.
+1. The common C is that of an earlier step. Its matrix is stored by its eigenvectors, which serve for every length of step
+   (`continuum.modes`).
 2. A step ends when the rates of all stages have converged, not only the momenta.
 3. Sweeps are accelerated by Anderson mixing of depth 2 (Walker and Ni, SIAM J. Numer. Anal. 49, 2011): the next guess is the
    combination of the last three results, with factors whose sum is one, that has the least sum of changes. Sweeps then converge
@@ -22,7 +23,8 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from continuum.galerkin import Modes, SpectralRod
+from continuum.galerkin import SpectralRod
+from continuum.modes import Modes, Pencil
 from discs.arrays import Float
 from discs.integrators.collocation import Collocation, tableau
 from discs.integrators.gauss import Guide, collocate
@@ -32,7 +34,7 @@ from discs.skew import Phase, add
 class Frozen(Guide):
     """The frozen part of the sweeps: the modes of a nearby configuration. It mixes sweeps."""
 
-    def __init__(self, rod: SpectralRod, z: Phase, modes: Modes, h: float, tolerance: float) -> None:
+    def __init__(self, rod: SpectralRod, z: Phase, modes: Modes | Pencil, h: float, tolerance: float) -> None:
         self._rod, self._modes, self._h, self._tolerance = rod, modes, h, tolerance
         self._start = rod.basis(z.hi + z.lo)
         self._results: list[tuple[Float, Float, Float]] = []
@@ -41,7 +43,7 @@ class Frozen(Guide):
         return self._rod.forward(self._start, p)
 
     def solve(self, value: complex, rest: Float) -> Float:
-        return self._modes.vectors @ ((self._modes.back @ rest) / (1 + self._h**2 * value**2 * self._modes.values))
+        return self._modes.solve(self._h * value, self._h**2 * value**2, rest)
 
     def moved(self, change: Float, before: Float, v: Float, p: Float) -> tuple[float, Float, Float]:
         moved = v - before
@@ -55,7 +57,15 @@ class Frozen(Guide):
 
 
 def step(
-    rod: SpectralRod, z: Phase, modes: Modes, t: float, h: float, stages: int, sweeps: int, tolerance: float, compiled: bool = True
+    rod: SpectralRod,
+    z: Phase,
+    modes: Modes | Pencil,
+    t: float,
+    h: float,
+    stages: int,
+    sweeps: int,
+    tolerance: float,
+    compiled: bool = True,
 ) -> tuple[Phase, Float, Float, int]:
     """One Gauss step.
 
@@ -80,7 +90,9 @@ def step(
 
     before = Phase(z.hi, z.lo, z.pi[None])
     after, v, p = Phase(*map(np.empty_like, before)), np.empty((stages, 3, rod.n)), np.empty((stages, 1, rod.n))
-    method, chain = Collocation(rule, sweeps, tolerance), rod.parameters._replace(modes=modes)
+    method, chain = Collocation(rule, sweeps, tolerance), rod.parameters._replace(modes=modes.at(h, rule.pairs))
+    if rod.loads:
+        chain = chain._replace(load=chain.load._replace(signals=rod.loads.at(t + h * rule.nodes)))
     while (cost := step(method, chain, before, after, t, h, v, p))[0] < 0:
         signal.raise_signal(signal.SIGINT)
     return after._replace(pi=after.pi[0]), v, p[:, 0], 0 if cost[2] else cost[0] // stages
@@ -91,6 +103,11 @@ def within(z: Phase, h: float, v: Float, p: Float, parts: Float) -> Phase:
     rates, momenta = _polynomials(len(v))
     series = legendre.legvander(2 * parts - 1, len(v))
     return Phase(*add(z.hi, z.lo, h * np.tensordot(series @ rates, v, 1)), z.pi + series @ momenta @ (p - z.pi))
+
+
+def spent(h: float, power: Float, parts: Float) -> Float:
+    """Work and dissipation at fractions `parts` (F,) of a step of length h, (F, 2), from their rates at the stages, (s, 2)."""
+    return h * legendre.legvander(2 * parts - 1, len(power)) @ _polynomials(len(power))[0] @ power
 
 
 @cache

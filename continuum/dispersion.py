@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from continuum.rod import Rod, SteeredRod
 from discs import checks
-from discs.arrays import Float
+from discs.arrays import Complex, Float
 from discs.chains.rolling import ROLLING, stretching
 
 
@@ -34,6 +34,23 @@ def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> Float:
     """
     t, _ = symbols(q, k)
     return np.sqrt((rod.torsion_stiffness * t + rod.bending_stiffness * rod.radius**2 * t**2) / rod.inertia)
+
+
+def response(rod: Rod, q: ArrayLike, rate: float, rolling: float = 0.0, torsion: float = 0.0, k: float | None = None) -> Complex:
+    """Complex amplitude of theta over that of a small torque per length, cos(q s) e^{i rate t}, on the straight rod at rest.
+
+    With rolling resistance c and torsional viscosity eta it is A in
+
+        (beta q^2 + K R^2 q^4 + i rate (c + eta q^2) - M rate^2) A = 1.
+
+    Parameters
+    ----------
+    q, k : as for `frequency`.
+    rolling, torsion : c and eta, as in `discs.loads.Damping`.
+    """
+    t, _ = symbols(q, k)
+    kept, lost = rod.inertia * (frequency(rod, q, k) ** 2 - rate**2), rate * (rolling + torsion * t)
+    return np.asarray(1 / (kept + 1j * lost), dtype=complex)
 
 
 def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: float | None = None) -> Float:

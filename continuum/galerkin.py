@@ -39,20 +39,16 @@ from continuum.density import Density
 from continuum.functions import polynomials, waves
 from continuum.initial import Resolved, resolve
 from continuum.kernels.spectral import Spectral
+from continuum.kernels.spectral_load import NONE
+from continuum.modes import Modes, Pencil
 from continuum.rod import Scene
+from continuum.weak import weak
 from discs.arrays import Complex, Float
 from discs.chains.rolling import ROLLING
+from discs.integrators.collocation import tableau
 from discs.skew import Phase, SkewGradient
 
 DATA = 24  # quadrature points per piece of the initial fields, in addition to those for the functions
-
-
-class Modes(NamedTuple):
-    """The eigenvectors of C^T (grad^2 V) C at a configuration: values (n,), vectors (n, n) as columns, back their transpose."""
-
-    values: Float
-    vectors: Float
-    back: Float
 
 
 class Basis(NamedTuple):
@@ -77,6 +73,7 @@ class SpectralRod(SkewGradient):
     law : the law of rolling.
     closed : whether the rod is closed.
     twist : (n,), the moment f of the initial twist.
+    loads : the loads of the scene, None if there are none.
     crossing : the time in which a wave as long as the rod crosses it, over 2 pi.
     start : the initial state.
     """
@@ -99,7 +96,9 @@ class SpectralRod(SkewGradient):
         self.crossing = rod.length**2 * np.sqrt(rod.inertia / stiffness) if stiffness else np.inf
         self._shift = complex(*scene.shift) / rod.length  # mean slope of a closed rod; z is the slope of the series plus this
         self.twist, self._offset = np.zeros(n), 0.0
-        self.start = self._start(resolve(scene))
+        initial = resolve(scene)
+        self.loads = weak(initial, self.functions, DATA + n // 2) if scene.loads else None
+        self.start = self._start(initial)
 
     @cached_property
     def parameters(self) -> Spectral:
@@ -120,6 +119,7 @@ class SpectralRod(SkewGradient):
             radius=float(self._radius),
             rolling=self.law.parameters,
             modes=None,
+            load=NONE if self.loads is None else self.loads.parameters,
         )
 
     @cached_property
@@ -146,8 +146,13 @@ class SpectralRod(SkewGradient):
         q = np.array([a.real, a.imag, np.zeros(self.n)])
         omega = functions.field(s).T @ (w * fields["omega"]) / functions.w
         start = Phase(q, np.zeros_like(q), omega / self.basis(q).t)
-        self._offset = initial.energy - self.energy(start)
+        self._offset = initial.energy + (self.loads.energy if self.loads else 0.0) - self.energy(start)
         return start
+
+    @property
+    def start_energy(self) -> float:
+        """The energy of the initial fields, by quadrature."""
+        return float(self.energies(Phase(*(part[None] for part in self.start)), np.zeros(1))[0])
 
     def slopes(self, z: Phase) -> Complex:
         """r' at the nodes as complex numbers, (..., n)."""
@@ -159,17 +164,25 @@ class SpectralRod(SkewGradient):
         e = self._radius * self.law.size(np.abs(self.slopes(z)))
         return z.pi / np.sqrt(self._spin + self._mass * e**2)
 
+    def power(self, t: float, h: float, v: Float) -> Float | None:
+        """The rates of work and dissipation at the stages of a step h from t, (s, 2), for rates v (s, 3, n), if there are loads."""
+        return None if self.loads is None else self.loads.power(t + h * tableau(len(v)).nodes, v)
+
     def energy(self, z: Phase) -> float:
-        """Kinetic and potential energy."""
+        """Kinetic and potential energy, but for loads that depend on time."""
         return float(self.energies(z))
 
-    def energies(self, z: Phase) -> Float:
-        """The energies of several states, by leading axes."""
+    def energies(self, z: Phase, t: Float | None = None) -> Float:
+        """The energies of several states, by leading axes; at times t (F,) with loads that depend on time."""
         kinetic: Float = 0.5 * (z.pi * z.pi).sum(axis=-1)
-        return kinetic + self._potentials(z.hi + z.lo)
+        q = z.hi + z.lo
+        energy = kinetic + self._potentials(q)
+        return energy if self.loads is None or t is None else energy + self.loads.driven(t, q)
 
     def _potentials(self, q: Float) -> Float:
         twice: Float = (q * self.mean_force(q)).sum(axis=(-2, -1)) + q[..., 2, :] @ self.twist
+        if self.loads:
+            twice = twice - (q * self.loads.constant).sum(axis=(-2, -1))
         return 0.5 * twice + self._offset
 
     def reader(self, s: Float) -> Callable[[Phase], dict[str, Float]]:
@@ -232,7 +245,8 @@ class SpectralRod(SkewGradient):
         return self.forward(bases, p)
 
     def pulls(self, bases: Basis, shape: Float, t: Float, z: Phase, moves: Float, p: Float) -> Float:
-        return self.back(bases, self.mean_force(shape + moves))
+        gradient = self.mean_force(shape + moves)
+        return self.back(bases, gradient if self.loads is None else gradient - self.loads.force(t, self.forward(bases, p)))
 
     def potential(self, shape: Float) -> float:
         return float(self._potentials(shape))
@@ -243,19 +257,30 @@ class SpectralRod(SkewGradient):
     def mean_force(self, secant: Float) -> Float:
         out = secant * self.bending
         out[..., 2, :] = secant[..., 2, :] @ self.torsion + self.twist
+        if self.loads:
+            out -= self.loads.constant
+            if self.loads.stiffness.size:
+                out[..., :2, :] += secant[..., :2, :] @ self.loads.stiffness
         return out
 
-    def modes(self, c: Basis) -> Modes:
-        """The eigenvectors of C^T (grad^2 V) C. With them (I + g C^T (grad^2 V) C)^-1 takes two matrix products for any g."""
+    def modes(self, c: Basis) -> Modes | Pencil:
+        """The eigenvectors of C^T (grad^2 V) C. With them (I + g C^T (grad^2 V) C)^-1 takes two matrix products for any g.
+
+        Damping has other eigenvectors: a `Pencil` then has both matrices.
+        """
         n, points = self.n, c.finer.shape[1]
         moves = np.zeros((n, points + n), complex)  # e psi of every function
         moves[:, :points] = (c.finer * self.functions.rates.reshape(3, points, n).transpose(2, 0, 1)).sum(axis=1)
         moves[:, points:] = np.diag(c.e)
         xy = np.hstack([moves.real @ self._project, moves.imag @ self._project]).reshape(n, 2, n)
         bent = (xy * self.bending).reshape(n, 2 * n) @ xy.reshape(n, 2 * n).T
-        values, vectors = np.linalg.eigh(c.t[:, None] * (bent + self.torsion) * c.t)
+        if self.loads and self.loads.stiffness.size:
+            bent += (xy @ self.loads.stiffness).reshape(n, 2 * n) @ xy.reshape(n, 2 * n).T
+        stiffness = c.t[:, None] * (bent + self.torsion) * c.t
+        if self.loads and self.loads.damping.size:
+            return Pencil(stiffness, c.t[:, None] * self.loads.damping * c.t)
+        values, vectors = np.linalg.eigh(stiffness)
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 
     def solve(self, secant: Float, c: Basis, g: complex, rhs: Float, d: complex = 0.0) -> Float:
-        values, vectors, back = self.modes(c)
-        return vectors @ ((back @ rhs) / (1 + g * values))
+        return self.modes(c).solve(d, g, rhs)

@@ -1,10 +1,12 @@
 """Piecewise Legendre polynomials of the initial fields, by bisection; see `continuum.initial`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import ArrayLike
 
 from continuum.rod import Scene
 from discs.arrays import Bool, Float, Int
@@ -17,6 +19,7 @@ TINY = 1e-9  # of the length: shorter pieces contain a corner or a jump
 SHORTEST = 2.0**-43  # of the length: smallest width, as places are rounded
 MOST = 4096  # pieces bisected at once
 EPS = np.finfo(float).eps
+PLACE, WHOLE = {"s": "place", "t": "time"}, {"s": "length", "t": "duration"}  # words for messages
 
 NODES, WEIGHTS = legendre.leggauss(POINTS)
 _OTHERS = 2 * np.modf(0.5 + np.arange(1, 9) * (5**0.5 - 1) / 2)[0] - 1
@@ -26,39 +29,67 @@ _AT_OTHERS = legendre.legvander(_OTHERS, POINTS - 1)
 ENDS = np.array([-1.0, 1.0])
 
 
-class Data:
-    """The initial fields of a scene as rows (F, ...), x and y less their chord; the size of each and the misfit allowed."""
+class Sampled:
+    """Functions of one variable on [0, length] as rows (F, ...); the size of each and the misfit allowed.
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.length = scene, scene.rod.length
+    Parameters
+    ----------
+    read : returns the functions at places (n,), as rows (F, n).
+    names : of the functions, for messages.
+    unit : (F,), sizes that count as one for rounding.
+    letter : of the variable, for messages.
+    """
+
+    title = ""
+
+    def __init__(
+        self, read: Callable[[Float], ArrayLike], length: float, names: tuple[str, ...], unit: ArrayLike = 0.0, letter: str = "s"
+    ) -> None:
+        self.length, self.names, self.letter, self._read = length, names, letter, read
         cells = np.arange(PROBES)
-        self.probes = self.length * (cells + np.modf(0.5 + cells * (5**0.5 - 1) / 2)[0]) / PROBES
-        fields = scene.fields(self.probes)
-        self.names = tuple(fields)
-        raw = np.stack(list(fields.values()))
-        self.chord = np.zeros(len(raw))
-        self.chord[:2] = (raw[:2, -1] - raw[:2, 0]) / (self.probes[-1] - self.probes[0])
+        self.probes = length * (cells + np.modf(0.5 + cells * (5**0.5 - 1) / 2)[0]) / PROBES
+        raw = np.asarray(read(self.probes))
+        self.chord, self.unit = self._chords(raw), np.broadcast_to(unit, len(raw))
         self.known = raw - np.outer(self.chord, self.probes)
         self.size = np.abs(self.known - self.known.mean(axis=1, keepdims=True)).max(axis=1)
-        units = {"x": self.length, "y": self.length, "omega": 1 / scene.duration, "phi_rate": 1 / scene.duration}
-        self.unit = np.array([units.get(name, 1.0) for name in self.names])
         self.rounding = 64 * EPS * np.maximum(np.abs(raw).max(axis=1), self.unit)
         self.allowed = SMALL * self.size + self.rounding
 
+    def _chords(self, raw: Float) -> Float:
+        """Slopes that are subtracted from each function, (F,), given the functions at the probes."""
+        return np.zeros(len(raw))
+
     def read(self, s: Float) -> Float:
-        """The fields at places (n,), x and y less their chord, (F, n)."""
-        return np.stack(list(self.scene.fields(s).values())) - np.outer(self.chord, s)
+        """The functions at places (n,) less their chord, (F, n)."""
+        return np.asarray(self._read(s)) - np.outer(self.chord, s)
 
     def refuse(self, row: int, what: str, cure: str) -> NoReturn:
-        """Raise ValueError about a field. The message says so if its values at a place depend on the other places asked for."""
+        """Raise ValueError about a function. The message says so if its values depend on the other places asked for."""
         apart = np.abs(self.read(self.probes[::2]) - self.known[:, ::2]).max(axis=1)
         if (apart > 1e3 * self.allowed).any():
-            name = self.names[int(np.argmax(apart))]
+            name = self.title + self.names[int(np.argmax(apart))]
             raise ValueError(
-                f"initial {name} must be a function of the place: its values change with what other places are asked for; "
-                "tabulate it once and interpolate"
+                f"{name} must be a function of the {PLACE[self.letter]}: its values change with what other "
+                f"{PLACE[self.letter]}s are asked for; tabulate it once and interpolate"
             )
-        raise ValueError(f"initial {self.names[row]} {what}; {cure}")
+        raise ValueError(f"{self.title}{self.names[row]} {what}; {cure}")
+
+
+class Data(Sampled):
+    """The initial fields of a scene, x and y less their chord."""
+
+    title = "initial "
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, length = scene, scene.rod.length
+        units = {"x": length, "y": length, "omega": 1 / scene.duration, "phi_rate": 1 / scene.duration}
+        unit = [units.get(name, 1.0) for name in scene.unknowns]
+        super().__init__(lambda s: list(scene.fields(s).values()), length, scene.unknowns, unit)
+
+    def _chords(self, raw: Float) -> Float:
+        chord = np.zeros(len(raw))
+        chord[:2] = (raw[:2, -1] - raw[:2, 0]) / (self.probes[-1] - self.probes[0])
+        return chord
 
 
 @dataclass(eq=False)
@@ -95,7 +126,7 @@ class Cut:
         return self.c @ values.T * (2 / self.width[:, None]) ** derivative
 
 
-def split(data: Data, edges: Float) -> Cut:
+def split(data: Sampled, edges: Float) -> Cut:
     """Bisect pieces until they are resolved or too short to be cut."""
     kept: list[tuple[Float, Float, Float, Float, Bool, Int]] = []
     lo, hi = edges[:-1], edges[1:]
@@ -123,8 +154,9 @@ def split(data: Data, edges: Float) -> Cut:
         if lo.size > MOST:
             data.refuse(
                 int(np.argmax(ratio[:, int(np.argmax(again))])),
-                f"is not resolved by {MOST} pieces of {POINTS} points: at s = {lo[0]:g} it varies within {hi[0] - lo[0]:.1g}",
-                f"smooth it over length/100 = {data.length / 100:g} or more",
+                f"is not resolved by {MOST} pieces of {POINTS} points: at {data.letter} = {lo[0]:g} it varies within "
+                f"{hi[0] - lo[0]:.1g}",
+                f"smooth it over {WHOLE[data.letter]}/100 = {data.length / 100:g} or more",
             )
         middle = (lo + hi) / 2
         lo, hi = np.stack([lo, middle], axis=1).ravel(), np.stack([middle, hi], axis=1).ravel()
@@ -142,7 +174,7 @@ def _in_both_halves(found: Bool) -> Bool:
     return np.repeat(found[:, ::2] & found[:, 1::2], 2, axis=1)
 
 
-def _misfit_at_probes(data: Data, lo: Float, hi: Float, c: Float, which: Bool) -> Float:
+def _misfit_at_probes(data: Sampled, lo: Float, hi: Float, c: Float, which: Bool) -> Float:
     """Largest misfit of every field at the probes in the pieces `which`, (F, P); 0 in other pieces and in those without probes."""
     worst = np.zeros(c.shape[:2])
     first, last = np.searchsorted(data.probes, lo), np.searchsorted(data.probes, hi)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from dataclasses import fields as dataclass_fields
 
 import numpy as np
 
@@ -111,12 +112,11 @@ class Scene:
     shift : for a closed rod, r(s + length) - r(s): (0, 0) for a ring, (length, 0) for a straight periodic rod.
     turns : for a closed `SteeredRod`, the number of full turns of the heading around it, 1 for a circle.
     name : a name for titles.
-    loads : loads of `discs.loads` whose patterns are numbers or functions of s; discs have them (`compare.lump`), `solve` does not
-        take them.
+    loads : forces besides those of the rod and the ground, `discs.loads`, with patterns that are numbers or functions of s.
 
     Raises
     ------
-    ValueError : for an unknown law, a duration that is not positive, or a shift of a rod that is not closed.
+    ValueError : for an unknown law, a duration that is not positive, a shift of a rod that is not closed, or loads of discs.
     """
 
     rod: Rod
@@ -134,10 +134,6 @@ class Scene:
             raise ValueError(
                 f"a scene needs a Rod and a function of s; got {checks.shown(self.rod)} and {checks.shown(self.initial)}"
             )
-        if not isinstance(self.loads, tuple) or not all(isinstance(load, OnRod) for load in self.loads):
-            raise ValueError(
-                f"loads of a scene must be a tuple of loads on a rod, as (Torque(...),); got {checks.shown(self.loads)}"
-            )
         if not isinstance(self.closed, bool):
             raise ValueError(f"closed must be True or False; got {checks.shown(self.closed)}")
         if self.steered:
@@ -149,12 +145,26 @@ class Scene:
         if shift.any() and not self.closed:
             raise ValueError(f"shift belongs to a closed rod; got shift={self.shift} with closed=False")
         object.__setattr__(self, "shift", tuple(np.asarray(shift).tolist()))
+        self._check_loads()
         if self.turns and not (self.closed and self.steered):
             raise ValueError(f"turns belong to a closed rod with headings of its own; got turns={self.turns} for another rod")
 
+    def _check_loads(self) -> None:
+        if not isinstance(self.loads, tuple) or not all(isinstance(load, OnRod) for load in self.loads):
+            raise ValueError(
+                f"loads of a scene must be a tuple of loads on a rod, as (Torque(...),); got {checks.shown(self.loads)}"
+            )
+        for load in self.loads:
+            for entry in dataclass_fields(load):  # type: ignore[arg-type]  # all are dataclasses
+                if np.ndim(value := getattr(load, entry.name)):
+                    raise ValueError(
+                        f"{entry.name} of {type(load).__name__} must be a number or a function of s for a scene, as an array "
+                        f"belongs to discs; got {checks.shown(value)}"
+                    )
+
     def fields(self, s: Float) -> dict[str, Float]:
         """The initial fields at places s (n,) by name, each (n,). ValueError if `initial` does not return what it should."""
-        names = ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if self.steered else 4]
+        names = self.unknowns
         places = s.copy()
         values = self.initial(places)
         if not np.array_equal(places, s):
@@ -169,6 +179,11 @@ class Scene:
         names = ("name", "rolling", "duration", "closed", "shift", "turns")
         loads = {"loads": [checks.shown(load) for load in self.loads]} if self.loads else {}
         return {name: getattr(self, name) for name in names} | asdict(self.rod) | loads
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """The names of the initial fields."""
+        return ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if self.steered else 4]
 
     @property
     def steered(self) -> bool:

@@ -15,6 +15,7 @@ from continuum.mesh import semidiscretise, unseen
 from continuum.refinement import solve_elements
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
+from continuum.timing import Timing
 from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.arrays import Float, Spline
 from discs.running.frames import frame_times
@@ -82,10 +83,8 @@ def solve(
     if not isinstance(scene, Scene):
         instead = "; simulate(problem) runs discs" if isinstance(scene, Problem) else ""
         raise ValueError(f"solve takes a Scene, such as untwisting_rod(); got {type(scene).__name__}{instead}")
-    if scene.loads:
-        raise ValueError(
-            "solve takes a scene without loads; discs take them: simulate(lump(scene, n)), or replace(scene, loads=())"
-        )
+    if scene.loads and scene.steered:
+        raise ValueError("solve takes no loads of a SteeredRod; simulate(lump(scene, n)) runs its discs with them")
     fitting = ("elements",) if scene.steered else ("richardson", "leapfrog")
     if scene.rod.curvature == "linear" and not scene.steered:
         fitting = ("spectral", *fitting)
@@ -105,9 +104,10 @@ def solve(
     times = frame_times(frames, scene.duration)
     solver = {"elements": solve_elements, "spectral": solve_spectral, "richardson": _richardson}[method]
     found = solver(scene, bound, times, progress)
-    drift = float(np.abs(found.energy - energy).max())
+    balance = found.energy - found.work + found.dissipated
+    drift = float(np.abs(balance - (balance[0] if scene.loads else energy)).max())
     stats = found.stats | {"scene": scene.description()}
-    return replace(found, error_estimate=(found.error_estimate or {}) | {"energy": drift}, stats=stats)
+    return replace(found, error_estimate={"energy": drift} | (found.error_estimate or {}), stats=stats)
 
 
 def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progress: bool) -> Solution:
@@ -144,6 +144,8 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
             return run(n, steps)
 
         steps, coarsest = 25, COARSEST
+        if scene.loads:
+            steps *= 2 ** max(0, int(np.ceil(np.log2(scene.duration / steps / Timing(scene).shortest))))
         while coarsest < FINEST and unseen(scene, mesh(coarsest)):
             coarsest = 2 * coarsest - 1
         coarse = shown(coarsest, steps)
@@ -186,7 +188,8 @@ def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:
     for name in FIELDS:
         u, v = getattr(fine, name), getattr(coarse, name)
         changed[name] = u + spline(scene, coarse.s, (u[:, ::2] - v) / 3)(fine.s).T
-    return replace(fine, energy=fine.energy + (fine.energy - coarse.energy) / 3, **changed)
+    balance = None if fine.balance is None or coarse.balance is None else fine.balance + (fine.balance - coarse.balance) / 3
+    return replace(fine, energy=fine.energy + (fine.energy - coarse.energy) / 3, balance=balance, **changed)
 
 
 def spline(scene: Scene, s: Float, values: Float) -> Spline:

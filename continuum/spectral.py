@@ -72,6 +72,7 @@ class Motion(NamedTuple):
     fields : (F, S) by name.
     start : largest error of the fields at the start, by name.
     tolerance : of a step. steps : number of steps.
+    balance : (F, 2), work and dissipation; None without loads.
     """
 
     rod: SpectralRod
@@ -81,6 +82,7 @@ class Motion(NamedTuple):
     n: int
     tolerance: float
     steps: int
+    balance: Float | None = None
 
 
 class Runner:
@@ -114,11 +116,16 @@ class Runner:
         at, initial = rod.reader(self.s), self._scene.fields(self.s)
         begun = at(rod.start)
         states = list(steps.at(self._times))
-        fields = at(Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True))))
+        every = Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
+        fields = at(every)
         if steps.lengths:
             self._first = steps.lengths[0]
         start = {name: float(np.abs(begun[name] - initial[name]).max()) for name in FIELDS}
-        return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths))
+        balance = None
+        if rod.loads:  # what signals change of the energy is work, too
+            balance = np.concatenate(steps.balance)
+            balance[:, 0] += rod.loads.driven(self._times, every.hi + every.lo) - rod.loads.driven(np.zeros(1), rod.start.hi[None])
+        return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance)
 
 
 def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
@@ -141,6 +148,15 @@ def bent_hint(scene: Scene) -> str:
     if curvature * length < BENT:
         return ""
     return "; the line starts bent at a free end, which may be why: the end has no curvature and sends out ever shorter waves"
+
+
+def point_hint(scene: Scene) -> str:
+    """A hint for scenes with a load at a point inside the rod; empty for others."""
+    points = [at for load in scene.loads if (at := getattr(load, "at", None)) is not None]
+    inside = [at for at in points if scene.closed or 0 < at < scene.rod.length]
+    if not inside:
+        return ""
+    return f"; the load at the point s = {inside[0]:g} makes a corner there, which functions resolve slowly: spread it over a width"
 
 
 class Search:
@@ -235,7 +251,7 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progr
         except TooFast as error:
             raise SimulationError(error.message + bent_hint(scene), error.step, error.time, error.disc) from None
         except ValueError as error:
-            raise ValueError(f"{error}{bent_hint(scene)}") from None
+            raise ValueError(f"{error}{bent_hint(scene)}{point_hint(scene)}") from None
     rounded = {"x": scene.rod.length, "y": scene.rod.length}
     estimate = {name: error + sweeps(found.tolerance) * rounded.get(name, 1.0) for name, error in search.estimate.items()}
     stats: Stats = {
@@ -245,6 +261,11 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progr
         "dt": scene.duration / max(found.steps, 1),
         "steps": found.steps,
     }
-    energy, slip = (np.concatenate([f(z) for z in found.states]) for f in (found.rod.energies, found.rod.slip))
+    slip = np.concatenate([found.rod.slip(z) for z in found.states])
+    ends = np.cumsum([len(z.pi) for z in found.states])[:-1]
+    groups = zip(found.states, np.split(times, ends), strict=True)
+    energy = np.concatenate([found.rod.energies(z, t) for z, t in groups])
+    if found.balance is not None:
+        estimate["energy"] = float(np.abs(energy - found.balance @ (1, -1) - found.rod.start_energy).max())
     x, y, theta, omega = (found.fields[name] for name in FIELDS)
-    return Solution(times, search.runner.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate)
+    return Solution(times, search.runner.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate, balance=found.balance)

@@ -7,6 +7,9 @@ only that of its end, which is more accurate if the motion is smooth; waves that
 states within a step are those of the polynomial (`collocation.within`) and need no extra steps. Gauss steps conserve the energy
 from end to end, but not within. If a step does not converge, or takes many sweeps, the next one is shorter.
 
+**Loads.** Steps end where a signal jumps or has a corner, and are not longer than the pieces on which it is smooth
+(`continuum.timing`), so none jumps over a pulse.
+
 **End of a motion.** Long steps must not jump over the end of a motion: for the unit law a heading is lost where z = r' vanishes, at
 a point or, when a ring collapses, everywhere. z is checked at each node, and where it is nearest to zero on the straight line
 from a node to the next. If Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at one of these, the step is repeated with half its length. So the
@@ -20,7 +23,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from continuum import collocation
-from continuum.galerkin import Modes, SpectralRod
+from continuum.galerkin import SpectralRod
+from continuum.modes import Modes, Pencil
 from discs import SimulationError
 from discs.arrays import Complex, Float
 from discs.kernels.limits import LOST_HEADING
@@ -76,6 +80,7 @@ class Steps:
     Attributes
     ----------
     lengths : lengths of the steps taken.
+    balance : work and dissipation since the start at the states that `at` gave, in groups (k, 2); without loads none.
     """
 
     def __init__(
@@ -87,24 +92,34 @@ class Steps:
         nodes, _ = legendre.leggauss(self._stages)
         self._series = np.linalg.inv(legendre.legvander(nodes, self._stages - 1))[-2:]  # rates of stages to last coefficients
         self._next = min(first, LONGEST * rod.crossing)
-        self._modes: Modes | None = None
+        self._modes: Modes | Pencil | None = None
         self._usual, self._excess = 0, 0  # sweeps of the step that computed the modes; additional sweeps of the steps since
         self.lengths: list[float] = []
+        self.balance: list[Float] = []
+        self._timing = rod.loads.timing if rod.loads else None
 
     def at(self, times: Float) -> Iterator[Phase]:
         """The states at times (F,), increasing, in groups: arrays have one more leading axis."""
-        t, z = 0.0, self.rod.start
+        t, z, spent = 0.0, self.rod.start, np.zeros(2)
         while times.size:
             if times[0] <= t:
+                if self.rod.loads:
+                    self.balance.append(spent[None])
                 yield Phase(z.hi[None], z.lo[None], z.pi[None])
                 times = times[1:]
                 continue
             before, start = t, z
             t, z, v, p = self._advance(t, z)
             inside = times[times < t]
+            power = self.rod.power(before, t - before, v)
             for some in np.split(inside, range(TOGETHER, inside.size, TOGETHER)):
                 if some.size:
-                    yield collocation.within(start, t - before, v, p, (some - before) / (t - before))
+                    parts = (some - before) / (t - before)
+                    if power is not None:
+                        self.balance.append(spent + collocation.spent(t - before, power, parts))
+                    yield collocation.within(start, t - before, v, p, parts)
+            if power is not None:
+                spent = spent + collocation.spent(t - before, power, np.ones(1))[0]
             times = times[inside.size :]
 
     def _step(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:
@@ -131,7 +146,10 @@ class Steps:
         """One converged step from z at t within the tolerance, with the rates and momenta of its stages."""
         slopes = self._slopes(z)
         while True:
-            left = self._duration - t
+            end = self._duration if self._timing is None else self._timing.stop(t)
+            left = end - t
+            if self._timing is not None:
+                self._next = min(self._next, self._timing.longest(t))
             h = left if self._next >= 0.9999 * left else min(self._next, left / 2)
             self._check_number(t)
             if h < SHORTEST * min(self._duration, self.rod.crossing):
@@ -148,7 +166,7 @@ class Steps:
                 continue
             self._next = h * min(1.8, max(0.5, growth)) * min(max(FEW_SWEEPS / taken, 0.6), 1.0)
             self.lengths.append(h)
-            return (self._duration if h == left else t + h), after, v, p
+            return (end if h == left else t + h), after, v, p
 
     def _turned(self, slopes: Complex, after: Phase) -> bool:
         """Whether a heading may have been lost within a step, given the slopes (n,) before it."""

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from continuum.kernels.mixing import History, mix
+from continuum.kernels.spectral_load import Load, press
 from discs.arrays import Complex, Float
 from discs.integrators.collocation import spread, transform
 from discs.kernels import protocol as do
@@ -22,7 +23,7 @@ class Spectral(NamedTuple):
 
     bends : (n, n + 3 F). rates : (n, 3 F). back : (3 F, n). project : (F + n, n). pull : (n, F + n). bending : (n,).
     torsion : (n, n). twist : (n,), moment of the initial twist. mass, spin : (n,), w rho and w alpha. scale : (3,).
-    modes : `continuum.galerkin.Modes` of a nearby configuration.
+    modes : `continuum.modes.Modes` of a nearby configuration. load : the loads.
     """
 
     bends: Float
@@ -40,6 +41,7 @@ class Spectral(NamedTuple):
     radius: float
     rolling: Parameters
     modes: Any
+    load: Load
 
 
 class Stages(NamedTuple):
@@ -151,11 +153,18 @@ def _forwards(rod, work, c, p, v):
 def _forces(rod, work, state, t, moves, c, p, g):
     s, _, n = moves.shape
     points, pull = c.finer.shape[2], g.reshape(s, n)
+    loaded = rod.load.patterns.shape[0] > 0
+    push = press(rod.load, work, moves, c.omega) if loaded else moves  # before c.omega is used for theta
     for i in range(s):
         for k in range(n):
             c.xy[2 * i, k] = rod.bending[k] * (work[0, k] + moves[i, 0, k])
             c.xy[2 * i + 1, k] = rod.bending[k] * (work[1, k] + moves[i, 1, k])
             c.omega[i, k] = work[2, k] + moves[i, 2, k]
+    if loaded:
+        for i in range(s):
+            for k in range(n):
+                c.xy[2 * i, k] -= push[i, 0, k]
+                c.xy[2 * i + 1, k] -= push[i, 1, k]
     np.dot(c.xy, rod.pull, c.moves)
     for i in range(s):
         x, y, fine = c.moves[2 * i], c.moves[2 * i + 1], c.rates[i]
@@ -165,6 +174,10 @@ def _forces(rod, work, state, t, moves, c, p, g):
                 fine[j * points + f] = finer[f].real * x[f] + finer[f].imag * y[f]
     np.dot(c.rates, rod.back, pull)
     np.dot(c.omega, rod.torsion, c.xy[:s])
+    if loaded:
+        for i in range(s):
+            for k in range(n):
+                c.xy[i, k] -= push[i, 2, k]
     for i in range(s):
         x, y, e = c.moves[2 * i], c.moves[2 * i + 1], c.e[i]
         for k in range(n):
@@ -186,6 +199,13 @@ def _begin(rod, work, method, room, before, h):
 @fill(do.solve, Spectral, _nrt=True)
 def _solve(rod, method, room, h):
     rule, z, parts, modal = method.tableau, room.stages.z, room.stages.parts, room.stages.modal
+    if rod.modes.inverses.shape[0]:
+        room.force[:] = 0.0
+        for j in range(rule.pairs.size):
+            transform(rule.pairs_in[j], room.rest, z)
+            z[0] = np.dot(rod.modes.inverses[j], z[0])
+            spread(rule.pairs_out[j], z, room.force)
+        return
     for j in range(rule.pairs.size):
         transform(rule.pairs_in[j], room.rest, z)
         parts[2 * j], parts[2 * j + 1] = z[0].real, z[0].imag

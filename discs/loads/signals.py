@@ -17,7 +17,14 @@ Signal = Callable[[float], Any]
 
 
 class Named:
-    """A signal that takes arrays of times."""
+    """A signal that takes arrays of times.
+
+    breaks : times at which it, or a derivative of it, jumps.
+    """
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return ()
 
     def __call__(self, t: ArrayLike) -> Float:
         raise NotImplementedError
@@ -56,6 +63,10 @@ class ramp(Named):
         if not self.t0 < self.t1:
             raise ValueError(f"t0 of {type(self).__name__} must be less than t1; got {self.t0:g} and {self.t1:g}")
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return self.t0, self.t1
+
     def __call__(self, t: ArrayLike) -> Float:
         found: Float = np.clip((np.asarray(t) - self.t0) / (self.t1 - self.t0), 0.0, 1.0)
         return found
@@ -86,6 +97,10 @@ class pulse(Named):
         if self.width <= 0:
             raise ValueError(f"width of pulse must be positive; got {self.width:g}")
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return self.t0, self.t0 + self.width
+
     def __call__(self, t: ArrayLike) -> Float:
         since = np.asarray(t) - self.t0
         found: Float = ((since >= 0) & (since < self.width)).astype(float)
@@ -111,6 +126,10 @@ class table(Named):
 
     def __repr__(self) -> str:
         return f"table({np.size(self.t)} values, t = {np.min(self.t):g} to {np.max(self.t):g})"
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return tuple(np.asarray(self.t).tolist())
 
     def __call__(self, t: ArrayLike) -> Float:
         found: Float = np.interp(t, self.t, self.values)  # type: ignore[arg-type]  # arrays by now

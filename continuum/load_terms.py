@@ -1,0 +1,155 @@
+"""The loads of a scene at places along the rod: what each load of `discs.loads` is, in the terms of `continuum.weak`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from functools import singledispatch
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from continuum.rod import Scene
+from discs import checks
+from discs.arrays import Float
+from discs.loads import Damping, Force, OnRod, Rest, Slope, Spring, Torque
+from discs.loads.signals import Signal, steady
+
+X, Y, ROLL, TWIST = range(4)  # what a force acts on: x, y, theta, theta'
+
+
+def read(name: str, pattern: Any, s: Float, least: float | None = None) -> Float:
+    """A pattern, a number or a function of s, at places (S,)."""
+    found: Float = checks.field(name, pattern(s.copy()) if callable(pattern) else pattern, s.size, least=least)
+    return found
+
+
+class Drive(NamedTuple):
+    """A force that a signal multiplies: on x, y, theta and theta' at places, (4, S). strain : as in `Terms`, of a rest twist."""
+
+    push: Float
+    signal: Signal
+    name: str
+    strain: Float | float = 0.0
+
+
+@dataclass(eq=False)
+class Terms:
+    """Loads at places along the rod, weights of the quadrature included.
+
+    s, w : (S,), places and weights; a place of a point load has the weight 0.
+    push : (4, S), constant forces on x, y, theta, theta', with a potential.
+    damping : (2, S), on omega and omega'. stiffness : (S,), of springs. offset : energy.
+    strain : (S,), the constant rest twist times sqrt(beta w); the square of the sum of rest twists is part of the energy.
+    """
+
+    scene: Scene
+    s: Float
+    w: Float
+    push: Float = field(init=False)
+    damping: Float = field(init=False)
+    stiffness: Float = field(init=False)
+    strain: Float = field(init=False)
+    offset: float = 0.0
+    drives: list[Drive] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        n = self.s.size
+        self.push, self.damping, self.stiffness, self.strain = np.zeros((4, n)), np.zeros((2, n)), np.zeros(n), np.zeros(n)
+
+    def at(self, load: OnRod, name: str, least: float | None = None) -> Float:
+        """A pattern at the places, (S,)."""
+        return read(f"{name} of {type(load).__name__}", getattr(load, name), self.s, least)
+
+    def shared(self, load: Any, name: str) -> Float:
+        """A pattern times the weights, (S,), or the number at the place of a point load."""
+        values = self.at(load, name)
+        if load.at is None:
+            return self.w * values
+        there = self.s == load.at
+        shared: Float = np.where(there, values, 0.0) / max(np.count_nonzero(there), 1)
+        return shared
+
+    def drive(self, load: Any, rows: dict[int, Float], strain: Float | float = 0.0) -> None:
+        push = np.zeros((4, self.s.size))
+        for row, values in rows.items():
+            push[row] = values
+        self.drives.append(Drive(push, steady() if load.signal is None else load.signal, type(load).__name__, strain))
+
+
+@singledispatch
+def add(load: Any, to: Terms) -> None:
+    """Add a load to the terms; a form for each class of loads."""
+
+
+def check_taken(loads: tuple[OnRod, ...]) -> None:
+    """ValueError for a load that has no form."""
+    for load in loads:
+        if add.dispatch(type(load)) is add.dispatch(object):
+            raise ValueError(
+                f"{type(load).__name__}: the spectral solver has no form of it; take method='richardson', or "
+                "simulate(lump(scene, n))"
+            )
+
+
+def _refuse_headings(load: OnRod, *names: str) -> None:
+    for name in names:
+        if callable(given := getattr(load, name)) or (given is not None and np.any(given)):
+            raise ValueError(f"{type(load).__name__}: {name} is for rods with headings of their own; here they follow the line")
+
+
+@add.register
+def _(load: Torque, to: Terms) -> None:
+    if load.about != "roll":
+        raise ValueError(f"Torque: about={load.about!r} is for rods with headings of their own; here they follow the line")
+    to.drive(load, {ROLL: to.shared(load, "pattern")})
+
+
+@add.register
+def _(load: Force, to: Terms) -> None:
+    to.drive(load, {X: to.shared(load, "x"), Y: to.shared(load, "y")})
+
+
+@add.register
+def _(load: Slope, to: Terms) -> None:
+    for row, g in ((X, load.gx), (Y, load.gy)):
+        to.push[row] += to.scene.rod.density * checks.number("g of Slope", g) * to.w
+
+
+@add.register
+def _(load: Spring, to: Terms) -> None:
+    stiffness = to.shared(load, "stiffness")
+    if (stiffness < 0).any():
+        raise ValueError(f"stiffness of Spring must be at least 0; got {stiffness.min():g}")
+    x, y = to.at(load, "x"), to.at(load, "y")
+    to.stiffness += stiffness
+    to.push[X] += stiffness * x
+    to.push[Y] += stiffness * y
+    to.offset += 0.5 * float(stiffness @ (x * x + y * y))
+
+
+@add.register
+def _(load: Damping, to: Terms) -> None:
+    _refuse_headings(load, "turning", "bending")
+    for row, name in enumerate(("rolling", "torsion")):
+        to.damping[row] += to.w * to.at(load, name, least=0.0)
+
+
+@add.register
+def _(load: Rest, to: Terms) -> None:
+    _refuse_headings(load, "curvature", "stretch", "shear", "mounting_angle")
+    root = np.sqrt(to.scene.rod.torsion_stiffness * to.w)
+    strain = root * to.at(load, "twist")
+    if load.signal is None:
+        to.push[TWIST] += root * strain
+        to.strain += strain
+    else:
+        to.drive(load, {TWIST: root * strain}, strain)
+
+
+def patterns(loads: tuple[OnRod, ...]) -> dict[str, Callable[[Float], Float]]:
+    """The patterns of loads that are functions of s, by names for messages."""
+    found: dict[str, Callable[[Float], Float]] = {}
+    for i, load in enumerate(loads):
+        for name in (f.name for f in fields(load) if f.name != "signal"):  # type: ignore[arg-type]  # all are dataclasses
+            if callable(pattern := getattr(load, name)):
+                found[f"{name} of {type(load).__name__} {i}"] = pattern
+    return found

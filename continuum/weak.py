@@ -1,0 +1,176 @@
+r"""The loads of a scene in Galerkin's method (`continuum.galerkin`).
+
+Admissible variations are (e psi, psi). Loads add their virtual work to d'Alembert's principle. Per length, for every psi,
+
+    torque tau        tau psi                      force F           F . e psi
+    slope             rho g . e psi                spring            -kappa (r - r_a) . e psi
+    rolling damping   -c omega psi                 torsional viscosity   -eta omega' psi'
+    rest twist tau_0  beta tau_0 psi'              from beta (theta' - tau_0)^2/2
+
+As for the elastic forces, e psi is replaced by P(e psi), which the functions can form. Then the virtual work is f . C delta for
+forces f on the coordinates: with the functions phi_k of the line and psi_k of theta
+
+    f_x,k = int F_x phi_k,   f_theta,k = int tau psi_k + beta tau_0 psi_k' - sum_l D_kl omega_l,
+    D_kl = int c psi_k psi_l + eta psi_k' psi_l',
+
+and the equations are pi. = -C^T (grad V - f), the contract of `discs.skew`. Gauss methods balance the energy as they do for discs:
+H_1 - H_0 = h sum_i b_i (work_i - dissipated_i), with work f . q. and dissipated omega^T D omega at the stages, as H is quadratic.
+Slopes, springs and constant rest twists have a quadratic potential and are part of V. A rest twist with a signal sigma(t) has the
+energy sigma^2 beta int tau_0^2/2 - sigma beta int tau_0 theta', and products with other rest twists. Its change is work too.
+
+**Ends.** A point torque tau at an end adds tau psi(0). Integration by parts then gives zero curvature and, with the end force
+beta theta' - K e . r''', the value -tau at s = 0 and +tau at s = length: the natural conditions, which need nothing else. A point
+force acts by e . F there. A rest twist has beta (theta' - tau_0) for beta theta', viscosity adds eta omega' to it.
+
+**Large steps.** The matrix of a sweep is I + h a C^T D C + (h a)^2 C^T S C, for the eigenvalues a of the Gauss coefficients. So
+neither stiff damping nor stiff springs limit steps or sweeps. The two matrices have no common eigenvectors, and a damped rod takes
+one inverse matrix for each pair of stages and each step.
+
+Integrals are sums over Gauss points on pieces on which the initial fields and the patterns are smooth. A pattern may jump.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from continuum.functions import Functions
+from continuum.initial import Resolved
+from continuum.kernels.spectral_load import Load
+from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken, patterns, read
+from continuum.pieces import Sampled, split
+from continuum.timing import Timing
+from discs.arrays import Float
+from discs.loads import signals
+from discs.loads.signals import Signal
+
+
+class Weak(NamedTuple):
+    """Loads on n functions.
+
+    constant : (3, n), forces with a potential. damping : (n, n), D on omega. stiffness : (n, n), of the springs on x and on y.
+        Both are (0, 0) if there are none.
+    drives : (L, 3, n). signals, names : of the drives. closing (L,), squares (L, L + 1) : energies of rest twists, see `driven`.
+    energy : the energy of the loads with a potential, for the initial fields.
+    timing : the pieces of the signals.
+    """
+
+    constant: Float
+    damping: Float
+    stiffness: Float
+    drives: Float
+    signals: tuple[Signal, ...]
+    names: tuple[str, ...]
+    closing: Float
+    squares: Float
+    energy: float
+    timing: Timing
+
+    @property
+    def parameters(self) -> Load:
+        """The parameters of the compiled form; signals are set before each step. The first pattern is the constant one."""
+        patterns = np.concatenate([self.constant[None], self.drives])
+        return Load(patterns.reshape(len(patterns), -1), np.empty((0, len(patterns))), self.damping, self.stiffness)
+
+    def at(self, t: Float) -> Float:
+        """The signals of the compiled form at the times of stages (s,)."""
+        return np.column_stack([np.ones(t.size), self.values(t)])
+
+    def values(self, t: Float) -> Float:
+        """The signals at times (m,), (m, L)."""
+        found = [signals.values(f, t, name) for f, name in zip(self.signals, self.names, strict=True)]
+        return np.stack(found, axis=1) if found else np.empty((t.size, 0))
+
+    def driven(self, t: Float, q: Float) -> Float:
+        """The part of the energy that depends on time, at times (m,) and changes of the positions (m, 3, n)."""
+        rest = self.squares.any(axis=1)
+        if not rest.any():
+            return np.zeros(t.size)
+        values = self.values(t)
+        strain = 0.5 * values @ self.squares[:, :-1] + self.squares[:, -1] - np.einsum("lin,min->ml", self.drives, q) - self.closing
+        total: Float = (values * strain)[:, rest].sum(axis=1)
+        return total
+
+    def power(self, t: Float, v: Float) -> Float:
+        """The rates of work and dissipation at times (m,) and rates (m, 3, n), (m, 2)."""
+        work = (self.values(t) * np.einsum("lin,min->ml", self.drives, v)).sum(axis=1)
+        omega = v[:, 2]
+        lost = (omega @ self.damping * omega).sum(axis=1) if self.damping.size else np.zeros(t.size)
+        return np.stack([work, lost], axis=1)
+
+    def force(self, t: Float, v: Float) -> Float:
+        """The forces without a potential, at times (m,) and rates (m, 3, n), (m, 3, n)."""
+        f: Float = np.einsum("ml,lin->min", self.values(t), self.drives)
+        if self.damping.size:
+            f[:, 2] -= v[:, 2] @ self.damping
+        return f
+
+
+def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
+    """The loads of a scene on functions, by Gauss quadrature with `order` points on every piece.
+
+    Raises
+    ------
+    ValueError : for a load that the method does not take, a bad pattern, or one that no pieces resolve.
+    """
+    scene = initial.scene
+    check_taken(scene.loads)
+    length, given = scene.rod.length, patterns(scene.loads)
+    edges = initial.pieces
+    if given:
+        data = Sampled(lambda s: [read(name, f, s) for name, f in given.items()], length, tuple(given))
+        cut = split(data, np.array([0.0, length]))
+        if breaks := cut.breaks():
+            cut = split(data, np.array([0.0, *breaks, length]))
+        if cut.lost.any():
+            p = int(np.argmax(cut.lost))
+            data.refuse(int(cut.worst[p]), f"is not finite and piecewise smooth at s = {cut.edges[p]:g}", "take one that is")
+        edges = np.unique(np.concatenate([edges, cut.edges]))
+    points = [float(at) for load in scene.loads if (at := getattr(load, "at", None)) is not None]
+    if bad := [at for at in points if not 0 <= at <= length]:
+        raise ValueError(f"at of a load must be on the rod, from 0 to {length:g}; got {bad[0]:g}")
+    x, w = legendre.leggauss(order)
+    half = np.diff(edges)[:, None] / 2
+    s = np.concatenate([(edges[:-1, None] + half * (1 + x)).ravel(), points])
+    terms = Terms(scene, s, np.concatenate([(half * w).ravel(), np.zeros(len(points))]))
+    for load in scene.loads:
+        add(load, terms)
+    line, theta, slope = functions.line(s), functions.field(s), functions.field(s, 1)
+    straight = np.outer(scene.shift, s) / length  # r of a closed rod less its series
+
+    def project(push: Float) -> Float:
+        found: Float = np.stack([push[X] @ line, push[Y] @ line, push[ROLL] @ theta + push[TWIST] @ slope])
+        return found
+
+    n, none = theta.shape[1], np.zeros((0, 0))
+    strains = np.array([0 * s + drive.strain for drive in terms.drives]).reshape(-1, s.size)
+    twisted = _slope(initial, edges, order, s.size) if strains.any() or terms.strain.any() else 0 * s
+    start = initial.fields(s)
+    line_energy = (
+        0.5 * terms.stiffness @ (start["x"] ** 2 + start["y"] ** 2) - terms.push[X] @ start["x"] - terms.push[Y] @ start["y"]
+    )
+    terms.push[:2] -= terms.stiffness * straight
+    return Weak(
+        constant=project(terms.push),
+        damping=(theta.T * terms.damping[0]) @ theta + (slope.T * terms.damping[1]) @ slope if terms.damping.any() else none,
+        stiffness=(line.T * terms.stiffness) @ line if terms.stiffness.any() else none,
+        drives=np.array([project(drive.push) for drive in terms.drives]).reshape(-1, 3, n),
+        signals=tuple(drive.signal for drive in terms.drives),
+        names=tuple(drive.name for drive in terms.drives),
+        closing=np.array([drive.push[TWIST] @ twisted for drive in terms.drives]),
+        squares=strains @ np.vstack([strains, terms.strain]).T,
+        energy=terms.offset + float(line_energy + 0.5 * terms.strain @ terms.strain - terms.push[TWIST] @ twisted),
+        timing=Timing(scene),
+    )
+
+
+def _slope(initial: Resolved, edges: Float, order: int, size: int) -> Float:
+    """theta' of the initial fields at the Gauss points of the pieces, (size,), and zeros after them."""
+    x, w = legendre.leggauss(order)
+    half = np.diff(edges)[:, None] / 2
+    s = (edges[:-1, None] + half * (1 + x)).ravel()
+    expand = (legendre.legvander(x, order - 1) * w[:, None]).T * (np.arange(order) + 0.5)[:, None]
+    theta = initial.fields(s)["theta"].reshape(-1, order) @ expand.T
+    found = np.zeros(size)
+    found[: s.size] = (theta @ legendre.legder(np.eye(order)).T @ legendre.legvander(x, order - 2).T / half).ravel()
+    return found

@@ -1,0 +1,247 @@
+"""Loads of a scene in the field's solver: closed forms, linear waves, the balance of energy, signals, both engines, messages."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from continuum import Rod, Scene, breathing_ring, solve, steered_rod, untwisting_rod
+from continuum.dispersion import response
+from continuum.spectral import Runner
+from discs.loads import Custom, Damping, Force, Potential, Rest, Slope, Spring, Torque, signals
+
+UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
+ROD = Rod(**UNEVEN)
+M = ROD.inertia
+SMOOTH = signals.smooth(0.0, 1.0)
+EVERYTHING = (
+    Torque(0.3, signals.sine(1.0, 2.0), at=0.0),
+    Torque(lambda s: 0.2 * (s > 1.3), signals.pulse(0.4, 0.05)),
+    Force(x=lambda s: 0.1 * s, y=0.2, signal=SMOOTH),
+    Damping(rolling=0.1, torsion=lambda s: 0.02 * (1 + s)),
+    Slope(gx=0.1, gy=-0.2),
+    Spring(lambda s: s, 0.1, 0.3),
+    Spring(0.0, 0.0, 0.4, at=3.0),
+    Rest(twist=lambda s: 0.2 * s, signal=SMOOTH),
+    Rest(twist=0.1),
+)
+
+
+def straight(duration, *loads, theta=lambda s: 0 * s, omega=0.0, rolling="field", rod=ROD, closed=False):
+    """A straight rod along x, rolled by theta: y = R theta."""
+
+    def initial(s):
+        roll = theta(s)
+        return s, rod.radius * roll, roll, omega(s) if callable(omega) else omega + 0 * s
+
+    shift = (rod.length, 0.0) if closed else (0.0, 0.0)
+    return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, closed=closed, shift=shift, loads=loads)
+
+
+def field(scene, tol=1e-9, frames=9):
+    return solve(scene, tol, frames=frames, progress=False)
+
+
+@pytest.fixture(params=["field", "unit"])
+def rolling(request):
+    return request.param
+
+
+def test_a_rod_rolls_down_a_slope(rolling):
+    """Without twist, M omega. = rho R g_y - c omega; the slope along the rod does nothing. The energy has the slope's potential."""
+    g, c = 0.4, 0.3
+    run = field(straight(2.0, Slope(gx=0.7, gy=g), omega=0.2, rolling=rolling))
+    theta = 0.2 * run.t + ROD.density * ROD.radius * g / M * run.t**2 / 2
+    assert np.abs(run.theta - theta[:, None]).max() < 1e-9
+    assert np.abs(run.y - ROD.radius * theta[:, None]).max() < 1e-9
+    start = ROD.length * M * 0.2**2 / 2 - ROD.density * 0.7 * ROD.length**2 / 2
+    assert run.energy == pytest.approx(start, rel=1e-9)
+    assert not run.work.any()
+    damped = field(straight(2.0, Slope(gy=g), Damping(rolling=lambda s: c + 0 * s), rolling=rolling))
+    speed = ROD.density * ROD.radius * g / c * (1 - np.exp(-c * damped.t / M))
+    assert np.abs(damped.omega - speed[:, None]).max() < 1e-8
+
+
+@pytest.mark.parametrize("c", [0.5, 30.0, 1e4])
+def test_a_damper_stops_the_roll_exponentially(c):
+    """However stiff, at few steps: theta = omega_0 M/c (1 - e^{-ct/M}), and all of the energy is dissipated."""
+    run = field(straight(2.0, Damping(rolling=c), omega=1.5), 1e-8)
+    assert np.abs(run.theta - 1.5 * M / c * (1 - np.exp(-c * run.t / M))[:, None]).max() < 1e-8
+    lost = ROD.length * M * 1.5**2 / 2 * (1 - np.exp(-2 * c * run.t / M))
+    assert np.abs(run.dissipated - lost).max() < 1e-6 * lost[-1]
+    assert run.stats["steps"] < 300
+
+
+def test_a_twist_relaxes_to_its_rest_by_viscosity():
+    """R = 0: with tau_0 = a q sin(q s) theta is -A cos(q s), alpha A.. + (c + eta q^2) A. + beta q^2 (A - a) = 0."""
+    rod, a, eta, c = Rod(**UNEVEN | {"radius": 0.0}), 0.7, 1.3, 0.2
+    q = np.pi / rod.length
+    run = field(straight(6.0, Rest(twist=lambda s: a * q * np.sin(q * s)), Damping(rolling=c, torsion=eta), rod=rod))
+    p, o = (c + eta * q**2) / rod.spin_inertia / 2, rod.torsion_stiffness * q**2 / rod.spin_inertia
+    low, high = np.roots([1, 2 * p, o])
+    amplitude = a * (1 - (high * np.exp(low * run.t) - low * np.exp(high * run.t)) / (high - low))
+    assert np.abs(run.theta + np.outer(amplitude, np.cos(q * run.s))).max() < 1e-9
+    assert abs(amplitude[-1] - a) < 0.2 * a
+    assert run.energy[0] == pytest.approx(rod.torsion_stiffness * (a * q) ** 2 * rod.length / 4, rel=1e-12)
+
+
+def waves(rate, c, eta):
+    """The wave numbers of e^{k s + i rate t}, two roots k and their opposites."""
+    stiff = ROD.bending_stiffness * ROD.radius**2
+    squares = np.roots([stiff, -(ROD.torsion_stiffness + 1j * rate * eta), 1j * rate * c - M * rate**2])
+    k = np.sqrt(squares.astype(complex))
+    return np.concatenate([k, -k])
+
+
+def test_a_driven_end_responds_as_linear_waves():
+    """A small torque tau e^{i rate t} at s = 0, resistance and viscosity, in the steady state: amplitude and phase to 1e-6.
+
+    With y = R theta: theta'' = 0 at both ends and (beta + i rate eta) theta' - K R^2 theta''' = -tau at s = 0, 0 at s = length.
+    """
+    rate, c, eta, tau = 1.7, 0.3, 0.2, 4e-4
+    k = waves(rate, c, eta)
+    ends = np.exp(np.outer([0.0, ROD.length], k))
+    force = (ROD.torsion_stiffness + 1j * rate * eta) * k - ROD.bending_stiffness * ROD.radius**2 * k**3
+    matrix = np.concatenate([k**2 * ends, force * ends])
+    parts = np.linalg.solve(matrix, [0, 0, -tau, 0])
+
+    def steady(s, t=0.0):
+        return (np.exp(np.outer(s, k)) @ parts) * np.exp(1j * rate * t)
+
+    loads = Torque(tau, signals.sine(1.0, rate, np.pi / 2), at=0.0), Damping(rolling=c, torsion=eta)
+    period = 2 * np.pi / rate
+    run = field(
+        straight(period, *loads, theta=lambda s: steady(s).real, omega=lambda s: (1j * rate * steady(s)).real), 1e-10, frames=9
+    )
+    turns = np.exp(1j * rate * run.t[:-1])
+    found = 2 * np.mean(run.theta[:-1] * turns.conj()[:, None], axis=0)
+    assert np.abs(found / steady(run.s) - 1).max() < 1e-6
+    assert run.work[-1] == pytest.approx(run.dissipated[-1], rel=1e-5)  # in a period
+
+
+def test_a_torque_along_the_rod_responds_as_the_dispersion_relation_says():
+    rate, c, eta, tau, q = 1.7, 0.3, 0.2, 3e-4, 2 * np.pi / ROD.length
+    amplitude = tau * response(ROD, q, rate, c, eta)
+    loads = Torque(lambda s: tau * np.cos(q * s), lambda t: np.cos(rate * t)), Damping(rolling=c, torsion=eta)
+    scene = straight(
+        2 * np.pi / rate,
+        *loads,
+        theta=lambda s: amplitude.real * np.cos(q * s),
+        omega=lambda s: (1j * rate * amplitude).real * np.cos(q * s),
+        closed=True,
+    )
+    run = field(scene, 1e-10)
+    found = 4 * np.mean(run.theta[:-1] * np.exp(-1j * rate * run.t[:-1])[:, None] * np.cos(q * run.s))
+    assert abs(found / amplitude - 1) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("signal", "area"),
+    [
+        (signals.pulse(1.234, 1e-6), 1e-6),
+        (lambda t: np.exp(-(((t - 1.234) / 0.003) ** 2)), 0.003 * np.sqrt(np.pi)),
+        (lambda t: 1.0 * (t > 1.234), 5.0 - 1.234),
+        (signals.table([0.0, 1.0, 1.01, 1.02], [0.0, 0.0, 3.0, 0.0]), 0.03),
+    ],
+    ids=["pulse", "narrow", "jump", "table"],
+)
+def test_steps_do_not_jump_over_a_signal(signal, area):
+    """A uniform torque: omega = tau/M times the integral of the signal, which a step of any usual length would not see."""
+    run = field(straight(5.0, Torque(0.5, signal), rolling="unit"), 1e-6)
+    assert run.omega[-1] == pytest.approx(0.5 * area / M, rel=1e-6)
+    assert run.stats["steps"] < 80
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_energy_is_balanced(rolling, compiled):
+    """All loads at once, at the ends of steps to the tolerance of sweeps; and the two engines agree."""
+    scene = replace(untwisting_rod(rolling, **UNEVEN, duration=1.0), loads=EVERYTHING)
+    run = Runner(scene, np.array([0.0, 0.4, 0.45, 1.0]), 4, compiled).run(19, 1e-4)
+    energy = np.concatenate(
+        [run.rod.energies(z, t) for z, t in zip(run.states, np.array([[0.0], [0.4], [0.45], [1.0]]), strict=True)]
+    )
+    off = energy - energy[0] - run.balance[:, 0] + run.balance[:, 1]
+    assert np.abs(off).max() < 1e-8
+    assert np.abs(run.balance[-1]).min() > 1e-3
+    assert energy[0] == pytest.approx(run.rod.start_energy, rel=1e-12)
+    other = Runner(scene, np.array([1.0]), 4, not compiled).run(19, 1e-4)
+    for name, value in other.fields.items():
+        np.testing.assert_allclose(run.fields[name][-1], value[-1], atol=1e-6)
+
+
+def test_the_energy_at_the_start_has_that_of_the_loads():
+    """By a sum over many places: slope, springs and rest twist of a bent and twisted rod."""
+    run = Runner(replace(untwisting_rod(**UNEVEN, duration=1.0), loads=EVERYTHING), np.array([0.0]), 4).run(19, 1e-4)
+    s = np.linspace(0, 3, 200_001)
+    slope = np.pi**2 / 6 * np.sin(np.pi * s / 3)  # theta' of theta = -pi/2 cos(pi s/3)
+    density = 0.45 * (slope - 0.1) ** 2 - 1.3 * 0.1 * s + 0.15 * 0.1**2
+    assert run.rod.start_energy == pytest.approx(np.trapezoid(density, s) + 0.2 * 9, rel=1e-9)
+
+
+@pytest.mark.slow  # kernels of chains
+def test_chains_of_discs_agree_with_all_loads(rolling):
+    """An independent discretisation, second-order differences extrapolated, within the sum of both estimates."""
+    loads = (Torque(0.3, SMOOTH, at=0.0), *EVERYTHING[2:])
+    scene = replace(untwisting_rod(rolling, **UNEVEN, duration=1.5), loads=loads)
+    a, b = (solve(scene, 1e-4, method, frames=4, progress=False) for method in ("spectral", "richardson"))
+    for name in ("x", "y", "theta"):
+        here, there = (getattr(run, name)[:, :: (run.s.size - 1) // 32] for run in (a, b))
+        gap = np.abs(here - there).max()
+        assert gap <= a.error_estimate[name] + b.error_estimate[name], (name, gap)
+    for name in ("work", "dissipated", "energy"):
+        assert np.abs(getattr(a, name) - getattr(b, name)).max() < 1e-4
+
+
+def test_a_scene_without_loads_computes_none():
+    scene = untwisting_rod(duration=0.5)
+    rod = Runner(scene, np.array([0.5]), 4).run(15, 1e-3).rod
+    assert rod.loads is None
+    assert not any(part.size for part in rod.parameters.load)
+    free, idle = solve(scene, 1e-4, progress=False), solve(replace(scene, loads=(Torque(0.0),)), 1e-4, progress=False)
+    np.testing.assert_allclose(idle.theta, free.theta, atol=1e-9)
+    assert free.balance is None
+    assert not idle.work.any()
+
+
+@pytest.mark.parametrize(
+    ("loads", "message"),
+    [
+        ([Torque(1.0)], r"loads of a scene must be a tuple of loads on a rod, as \(Torque\(...\),\); got \["),
+        ((Torque(np.ones(5)),), r"pattern of Torque must be a number or a function of s for a scene"),
+        ((Torque(1.0, at=3.5),), r"at of a load must be on the rod, from 0 to 3; got 3.5"),
+        ((Torque(lambda s: 1 / (s - 1.0)),), r"pattern of Torque 0 is not finite and piecewise smooth at s = 1"),
+        ((Torque(1.0, about="turn"),), r"about='turn' is for rods with headings of their own"),
+        ((Damping(turning=1.0),), r"turning is for rods with headings of their own"),
+        ((Damping(rolling=-1.0),), r"rolling of Damping must be .*at least 0"),
+        ((Rest(curvature=1.0),), r"curvature is for rods with headings of their own"),
+        ((Spring(0, 0, -1.0),), r"stiffness of Spring must be at least 0; got -"),
+        ((Torque(1.0, lambda t: np.nan),), r"Torque: the signal .* finite numbers; got nan at t = "),
+        ((Torque(1.0, lambda t: np.random.default_rng().random()),), r"the signal of Torque must be a function of the time"),
+        ((Custom(lambda t, q, v: q),), r"Custom: the spectral solver has no form of it; take method='richardson'"),
+        ((Potential(lambda x, y: x, lambda x, y: (1, 0)),), r"Potential: the spectral solver has no form of it"),
+    ],
+)
+def test_loads_that_cannot_be_taken_are_refused(loads, message):
+    with pytest.raises(ValueError, match=message):
+        solve(straight(1.0, *loads) if isinstance(loads, tuple) else replace(straight(1.0), loads=loads), 1e-3, progress=False)
+
+
+def test_loads_of_rods_with_headings_and_of_the_paper_s_scheme_are_refused():
+    with pytest.raises(ValueError, match=r"solve takes no loads of a SteeredRod; simulate\(lump\(scene, n\)\)"):
+        solve(replace(steered_rod(), loads=(Torque(1.0),)), progress=False)
+    with pytest.raises(ValueError, match="'leapfrog' does not take loads"):
+        solve(replace(untwisting_rod(), loads=(Torque(1.0),)), method="leapfrog", progress=False)
+
+
+def test_a_point_load_inside_the_rod_says_why_it_is_slow(monkeypatch):
+    monkeypatch.setattr("continuum.spectral.SIZES", (15, 19))
+    with pytest.raises(ValueError, match=r"not reached.*the load at the point s = 1.3 makes a corner there"):
+        solve(straight(1.0, Torque(1.0, SMOOTH, at=1.3)), 1e-6, progress=False)
+
+
+def test_a_ring_with_a_torque_stays_round(rolling):
+    """A uniform torque and resistance on a ring: the work is that of the torque, and no wave grows."""
+    scene = replace(breathing_ring(rolling, duration=0.3, radius=0.7), loads=(Torque(0.5), Damping(rolling=0.2)))
+    run = field(scene, 1e-8)
+    assert np.ptp(run.theta, axis=1).max() < 1e-9
+    assert run.work == pytest.approx(0.5 * scene.rod.length * run.theta[:, 0], abs=1e-8)
