@@ -32,7 +32,8 @@ EPS = float(np.finfo(float).eps)
 ENOUGH = 1e-12  # relative error at which the search for a step stops
 USABLE = 1e-3  # relative error above which a real difference is no check: |q| is so large that rounding hides f's features
 MOST_SLACK = 1e-6
-ACCURATE = 1e-9  # a relative error above this, and above all before, starts a new search for the step
+ACCURATE = 1e-9  # a relative error above this, and twice that of the last search, starts a new search for the step
+AGAIN = 20  # so many derivatives after the last search the error of it does not count: it may have been at a kink
 # weights of f(q + j h) - f(q - j h), j = 1 ... 4
 ORDER_8 = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
 ORDER_6 = np.array([3 / 4, -3 / 20, 1 / 60, 0])
@@ -71,6 +72,7 @@ class Formula:
         self.name, self.shape, self.size, self.arguments = name, shape, size, arguments
         self.how, self.error = "complex step", 0.0
         self._call = call
+        self._searched, self._since = 0.0, 0  # error at the last search, derivatives since then
         self._cancels, self._terms = cancels, 0.0  # size of the terms of f where they cancel
         self._steps: Float | None = None  # (m,), of real differences
         self._verified = False  # whether the complex step agreed with real differences once
@@ -121,7 +123,8 @@ class Formula:
         taken = [self._difference(q, h * d, 1 / h) for h, d in zip(scales, directions.T, strict=True)]
         found, error = np.stack([d for d, _ in taken], axis=-1), max(e for _, e in taken)
         size = float(np.abs(found).max(initial=0.0))
-        if not error <= max(ACCURATE, 2 * self.error) * size:
+        self._since += 1
+        if not error <= max(ACCURATE, 2 * self._searched * (self._since < AGAIN)) * size:
             whole = self._examine(q)
             return whole if v is None else (whole @ v)[..., None]
         self.error = error / size if size else 0.0
@@ -196,7 +199,7 @@ class Formula:
                     self._verified = True
                     return by_step
             self.how = "real differences"
-        self.error = error
+        self.error, self._searched, self._since = error, error, 0
         return whole
 
     def _search(self, q: Float, k: int) -> tuple[Float, float, float]:

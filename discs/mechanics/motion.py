@@ -34,7 +34,7 @@ METHODS = ("auto", "DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 EXPLICIT = ("DOP853", "RK45", "RK23")  # of one step: the state can be corrected after each
 LEAST_RTOL = 100 * float(np.finfo(float).eps)
 LEAST_STEPS = 100  # if forces or drives depend on t, so that a short signal is not stepped over
-JUMP = 1e-9  # of the time span: velocities that are off a drive after so short a step show that it jumps
+JUMP, SHORT = 1e-5, 1e-9  # velocities off a drive by this part of their size, after a step of this part of the span: it jumps
 STALLED = 1000  # so many steps over less than 1e-6 of the time span stop the integration
 STALLED_NEAR = 50  # the same near dependent rows
 
@@ -179,7 +179,8 @@ def _follow(
                 again = ranks.crossed(solver.y) or bool(large.any())
             recent.append(before if again else solver.t)
             count = STALLED if not ranks.words() else STALLED_NEAR
-            if solver.status != "failed" and large.any() and abs(solver.t - before) < JUMP * span and callable(system.drive):
+            off = np.abs(y - solver.y)[m : 2 * m] > JUMP * sizes.of(solver.y)[m : 2 * m]
+            if again and off.any() and abs(solver.t - before) < SHORT * span and callable(system.drive):
                 worst = system.owners[int(np.argmax(np.abs(system.residual(solver.y[:m], solver.y[m : 2 * m], solver.t))))]
                 raise RuntimeError(
                     f"the motion cannot be continued beyond t = {solver.t:.9g}: the drive b(t, q) of {worst} jumps there, and a "

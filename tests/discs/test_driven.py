@@ -286,6 +286,23 @@ def test_forces_and_drives_agree_with_the_reduced_form():
     assert saddle.acceleration[2] == pytest.approx(np.cos(t) + v[0], abs=1e-14)
 
 
+TABLE = np.array([0.0, 0.8, 0.9, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("drive", "way"),
+    [
+        (lambda t, q: np.clip(t, 0, 1), 2.5),
+        (lambda t, q: np.interp(t, np.arange(4), TABLE), TABLE[:-1].sum() + (TABLE[-1] - TABLE[0]) / 2),
+    ],
+)
+def test_a_drive_with_kinks(drive, way):
+    """A ramp from the start on, and a table with a kink at frames: the way is the integral."""
+    path = one(drive=drive).integrate([0], [0], [0, 1.0, 2.0, 3.0], 1e-7, progress=False)
+    assert path.q[-1, 0] == pytest.approx(way, abs=1e-7)
+    assert balance(path) < 1e-6
+
+
 def test_a_vakonomic_drive():
     """y. = sin x + t: the action of L + mu (y. - sin x - t), Euler-Lagrange x.. = -mu cos x and y. + mu = const."""
     system = MechanicalSystem.from_lagrangian(

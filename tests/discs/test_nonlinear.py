@@ -75,6 +75,7 @@ def test_a_speed_that_is_driven(method):
     np.testing.assert_allclose(path.multipliers[:, 0], 1.3 * TIMES / (2 * speed**2), atol=bound)
     np.testing.assert_allclose(path.reaction_work, 0.65 * TIMES**2, atol=bound)
     assert np.abs(path.work).max() < bound
+    assert path.stats["derivatives"]["phi"] == {"how": "complex step", "error": 0.0}  # rounding where phi is 0 is no error
 
 
 def test_two_particles_with_parallel_velocities():
