@@ -82,6 +82,8 @@ class Problem:
             self._check_slopes(self.chain)
         else:
             self._check_inertia(np.asarray(self.chain.radius) > 0, "radius = 0")
+        if self.loads:
+            self._check_forces()
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arguments only: other processes build the system again."""
@@ -101,14 +103,18 @@ class Problem:
             if isinstance(load, Linear):
                 for drive in load.drives:
                     signals.values(drive.signal, np.array([0.0, self.duration]), drive.name)
-                continue
             if isinstance(load, Held):
                 self._check_motor(load)
-            q = self._positions()
-            force = np.asarray(load.force(0.0, q, np.zeros(shape)), dtype=float)
-            if force.shape != shape or not np.isfinite(force).all():
-                got = f"shape {force.shape}" if force.shape != shape else "values that are not finite"
-                raise ValueError(f"{type(load).__name__}: the force must be finite numbers of shape {shape}; got {got} at t = 0")
+
+    def _check_forces(self) -> None:
+        """Refuse forces of the initial state that are no finite numbers for each coordinate and disc."""
+        z, system = self.start(), self.system
+        v = system.forward(system.basis(system.shape(z.hi)), z.pi)
+        for load in self.bound:
+            force = np.asarray(load.force(0.0, z.hi.copy(), v.copy()), dtype=float)
+            if force.shape != v.shape or not np.isfinite(force).all():
+                got = f"shape {force.shape}" if force.shape != v.shape else "values that are not finite"
+                raise ValueError(f"{type(load).__name__}: the force must be finite numbers of shape {v.shape}; got {got} at t = 0")
 
     def _check_motor(self, load: Held) -> None:
         """Refuse a rate that differs from that of the initial state, or is not finite at the end."""

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from discs import checks
 from discs.arrays import Float
 from discs.loads import signals
 from discs.loads.signals import Signal
@@ -73,6 +74,13 @@ class Linear(Load):
             if not np.isfinite(value).all() or (name != "constant" and (value < 0).any()):
                 raise ValueError(f"{name} must be finite{'' if name == 'constant' else ' and at least 0'}; got {value}")
             object.__setattr__(self, name, np.array(value))
+        if self.viscosity is not None:
+            links, need = np.array(self.viscosity, dtype=float), (len(self.constant) - 2, self.constant.shape[-1] + 1)
+            if links.shape != need or not np.isfinite(links).all() or (links < 0).any():
+                raise ValueError(
+                    f"viscosity must be finite, at least 0 and of shape {need}; got {checks.shown(links)}: {links.min():g}"
+                )
+            object.__setattr__(self, "viscosity", links)
         object.__setattr__(self, "conservative", not self.damping.any() and self.viscosity is None and not self.drives)
         pushed = self.constant != 0
         push, spring = self.constant[pushed], self.stiffness[pushed]
@@ -135,7 +143,7 @@ class Linear(Load):
         times = np.sort(times)
         times = times[np.diff(times, prepend=-np.inf) > 0]
         values = np.stack([signals.values(drive.signal, times, drive.name) for drive in self.drives], axis=1)
-        return filled._replace(times=times, values=values, near=np.array([NEAR * h + 4e-16 * abs(times[-1])]))
+        return filled._replace(times=times, values=values, near=np.array([NEAR * h + 1e-14 * abs(times[-1])]))
 
 
 def _at(drive: Drive, t: float) -> float:

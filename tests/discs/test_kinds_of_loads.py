@@ -165,6 +165,15 @@ def test_summaries_and_pictures_speak_of_the_balance():
         balances(untwisting_rod().rod, run, "field")
 
 
+def test_a_force_may_divide_by_the_speed_of_discs_that_move():
+    """Forces are tried at the initial state, not at rest."""
+    problem = uneven(7, KINDS[0])
+    friction = Custom(lambda t, q, v: np.array([0 * v[2], 0 * v[2], -0.01 * v[2] / abs(v[2])]))
+    replace(problem, loads=(friction,))
+    with np.errstate(invalid="ignore"), pytest.raises(ValueError, match="Custom: the force must be finite numbers"):
+        replace(problem, initial=replace(problem.initial, omega=0.0), loads=(friction,))
+
+
 def test_the_energy_of_another_state_needs_no_motor():
     problem = uneven(7, KINDS[0])
     driven = replace(problem, loads=(Motor(float(problem.initial.omega[2]), problem.chain.s[2]), Slope(0.1)))
@@ -348,6 +357,12 @@ def test_the_balance_stays_exact_over_many_steps(engine, kernels_as_python):
         (lambda p: Spring(0.0, 0.0, -1.0), "stiffness of Spring must be at least 0"),
         (lambda p: Slope(np.inf), "gx of Slope must be a finite number"),
         (lambda p: Custom(lambda t, q, v: q[0]), r"Custom: the force must be finite numbers of shape \(3, 7\); got shape \(7,\)"),
+        (lambda p: Custom(lambda t, q, v: np.nan * q), "Custom: the force must be finite numbers"),
+        (
+            lambda p: Linear(np.zeros((3, 7)), viscosity=np.ones((1, 7))),
+            r"viscosity must be finite, at least 0 and of shape \(1, 8\)",
+        ),
+        (lambda p: Linear(np.zeros((3, 7)), viscosity=-np.ones((1, 8))), "viscosity must be finite, at least 0"),
         (lambda p: Custom(3), "force and power of Custom must be functions"),
         (lambda p: Potential(lambda x, y: x, None), "gradient of Potential must be a function"),
     ],
