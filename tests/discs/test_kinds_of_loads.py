@@ -97,6 +97,17 @@ def test_loads_of_every_kind_move_discs_as_the_saddle_point_says(model, kernels_
     np.testing.assert_allclose(contact_force, multipliers, rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("model", "method"), [(KINDS[0], "gauss6"), (KINDS[4], "midpoint")])  # each takes 20 s to compile
+def test_loads_compile(model, method):
+    problem = uneven(7, model)
+    problem = replace(problem, loads=every(problem))
+    one, other = (simulate(problem, method, 0.02, [0.33, 1.0], progress=False, engine=e) for e in ("compiled", "plain"))
+    assert one.stats["engine"] == "compiled"
+    for name in (*problem.system.rows, "work", "dissipated", "energy"):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0, atol=1e-12)
+
+
 @models(KINDS)
 @pytest.mark.parametrize("engine", ["compiled", "plain"])
 def test_energy_is_work_less_dissipation(model, engine, kernels_as_python):

@@ -20,7 +20,6 @@ KINDS = [
     Model("ring", "steered"),
 ]
 TAKING = {"midpoint": 2e-3, "suzuki4": 2e-5, "gauss6": 1e-6, "rk4": 1e-5, "DOP853": 1e-6}  # largest error at dt = 0.02, rk4's 0.002
-COMPILED = [(KINDS[0], "gauss6"), (KINDS[4], "midpoint")]  # each takes 20 s; the others run as plain Python
 
 
 def loaded(model: Model, n: int = 7) -> Problem:
@@ -60,14 +59,6 @@ def test_loads_move_discs_as_the_saddle_point_says(model, kernels_as_python):
             found, contact_force = by_discs(problem, name, engine)
             np.testing.assert_allclose(found, expected, rtol=0, atol=close, err_msg=f"{name}, {engine}")
     np.testing.assert_allclose(contact_force, multipliers, rtol=0, atol=1e-5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("model", "name"), COMPILED)
-def test_loads_compile(model, name):
-    problem = loaded(model)
-    found, expected = (by_discs(problem, name, engine)[0] for engine in ("compiled", "plain"))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def rolling(damping: float, n: int = 3) -> Problem:
