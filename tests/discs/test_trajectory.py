@@ -8,6 +8,7 @@ import pytest
 
 from discs import MechanicalSystem, Problem, State, load, simulate
 from discs.command_line import about
+from discs.loads import Linear
 from discs.mechanics import Trajectory, driven, textbook
 from discs.mechanics.lagrange import frames, lagrange_dalembert
 from tests.conftest import SLAVED, STEERED, uneven
@@ -68,6 +69,21 @@ def test_two_discs_as_the_run_that_they_are(model):
         np.testing.assert_allclose(getattr(run, name), getattr(known, name), atol=1e-7)
     assert run.problem is problem
     np.testing.assert_array_equal(run.s, problem.chain.s)
+
+
+def test_a_damped_chain_is_the_run_with_that_load():
+    """The load in q. = C pi, pi. = -C^T (grad V - f), against the same forces in the saddle point, with their work."""
+    problem = replace(uneven(3, STEERED[0]), duration=0.3)
+    damping = np.array([[0.3] * 3, [0.2] * 3, [0.5, 0.1, 0.4], [0.2] * 3])
+    system, (q, v) = lagrange_dalembert(problem, dense=True), frames(problem)
+    system = replace(system, applied=lambda t, q, v: -damping.ravel() * v)
+    path = system.integrate(q, v, np.linspace(0, 0.3, 4), 1e-10, progress=False)
+    loaded = replace(problem, loads=(Linear(damping=damping),))
+    known = simulate(loaded, "gauss8", 0.01, frames=4, engine="plain", progress=False)
+    for name in ("x", "y", "theta", "phi", "omega", "energy"):
+        np.testing.assert_allclose(getattr(path.discs, name), getattr(known, name), atol=1e-8)
+    np.testing.assert_allclose(path.energy - path.energy[0], path.work, atol=1e-9)
+    assert path.work[-1] < -1e-3
 
 
 def test_discs_of_a_system_of_ones_own():
