@@ -4,7 +4,7 @@ A file contains one variable for each quantity of a `Solution` over the dimensio
 attributes (parameters that differ between discs as variables), and a checksum of each frame. Nothing in a file is executed.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,18 @@ import numpy as np
 from discs.arrays import Float
 from discs.files import safe
 from discs.files.framefile import FrameFile, room
-from discs.files.schema import CHECKSUM, COORDINATES, RECORDED, Header, attributes, dimensions, frame_checksum, header
+from discs.files.schema import (
+    CHECKSUM,
+    COORDINATES,
+    MOTION,
+    QUANTITIES,
+    RECORDED,
+    Header,
+    attributes,
+    dimensions,
+    frame_checksum,
+    header,
+)
 from discs.mechanics import Trajectory
 from discs.solution import Result, Solution
 
@@ -26,10 +37,10 @@ SUFFIXES = (".nc", ".nc4", ".h5", ".hdf5")  # of NetCDF-4, which is HDF5
 
 def recorded(run: Result) -> dict[str, Float]:
     """The recorded arrays of a run, by name; of a mechanical system, also those of its discs."""
-    parts: list[Result] = [run]
+    parts: list[tuple[Result, Iterable[str]]] = [(run, (*MOTION, "energy") if isinstance(run, Trajectory) else QUANTITIES)]
     if isinstance(run, Trajectory) and run.bodies is not None:
-        parts.append(run.discs)
-    rows = {name: np.asarray(getattr(part, name)) for part in parts for name in RECORDED if getattr(part, name, None) is not None}
+        parts.append((run.discs, QUANTITIES))
+    rows = {name: np.asarray(value) for part, names in parts for name in names if (value := getattr(part, name)) is not None}
     return {name: rows[name] for name in RECORDED if name in rows and rows[name].size}
 
 

@@ -1,6 +1,6 @@
 """The motion of a mechanical system at given times."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,10 @@ class Trajectory(Result):
             )
         if isinstance(self.bodies, Solution):
             return self.bodies
-        return self.bodies.run(self.t, self.q, self.v, self.energy, self.stats)
+        found = self.bodies.run(self.t, self.q, self.v, self.energy, self.stats)
+        if self.work is None or self.reaction_work is None:
+            return found
+        return replace(found, balance=np.stack([self.work + self.reaction_work, 0 * self.work], axis=1))
 
 
 def at_frames(system: Equations, t: Float, found: Float, charged: bool, stats: dict[str, Any]) -> Trajectory:

@@ -84,6 +84,7 @@ def test_a_damped_chain_is_the_run_with_that_load():
         np.testing.assert_allclose(getattr(path.discs, name), getattr(known, name), atol=1e-8)
     np.testing.assert_allclose(path.energy - path.energy[0], path.work, atol=1e-9)
     assert path.work[-1] < -1e-3
+    np.testing.assert_allclose(path.discs.work, known.work - known.dissipated, atol=1e-8)
 
 
 def test_discs_of_a_system_of_ones_own():
