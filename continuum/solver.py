@@ -107,7 +107,8 @@ def solve(
     balance = found.energy - found.work + found.dissipated
     drift = float(np.abs(balance - (balance[0] if scene.loads else energy)).max())
     stats = found.stats | {"scene": scene.description()}
-    return replace(found, error_estimate={"energy": drift} | (found.error_estimate or {}), stats=stats)
+    estimate = found.error_estimate or {}
+    return replace(found, error_estimate=estimate | {"energy": estimate.get("energy", drift)}, stats=stats)
 
 
 def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progress: bool) -> Solution:
