@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from compare import precision, report
+from compare import load_limits, precision, report
 from compare.background import background
 from compare.hardcases.table import Stability, kept, stability
 from compare.limits import limits
@@ -63,6 +63,7 @@ def parser() -> argparse.ArgumentParser:
     add_trust(
         commands.add_parser("trust", help="random scenes: whether errors stay below the tolerances", description=about(trust))
     )
+    add_loads(commands.add_parser("loads", help="N to infinity under loads", description=about(load_limits)))
     add_report(commands.add_parser("report", help="everything on one page", description=about(report)))
     return p
 
@@ -110,6 +111,25 @@ def write_trust(found: Trust, out: str) -> None:
     with fresh_files(out) as folder:
         found.save(folder / "trust.csv")
         (folder / "trust.md").write_text(f"# Random scenes\n\n{found.summary()}\n\n{found.table()}\n", encoding="utf-8")
+
+
+def add_loads(p: argparse.ArgumentParser) -> None:
+    """The options of `loads`."""
+    p.add_argument("--out", metavar="DIR", default="out", help="folder for loads.csv and loads.png (default: out)")
+    p.add_argument(
+        "--n", metavar="N", type=int, nargs="+", default=list(load_limits.SIZES), help="numbers of discs (default: 129 ... 1025)"
+    )
+    p.add_argument(
+        "--tol", metavar="TOL", type=float, default=1e-8, help="largest error of the fields, length and rad (default: 1e-8)"
+    )
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
+    p.set_defaults(run=run_loads)
+
+
+def run_loads(options: argparse.Namespace) -> None:
+    """Compare loaded discs with loaded fields."""
+    print(load_limits.load_limits(options.out, not options.quiet, tuple(options.n), options.tol))
+    print(f"\nwritten to {options.out}: loads.csv, loads.png")
 
 
 def add_report(p: argparse.ArgumentParser) -> None:

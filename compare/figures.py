@@ -1,6 +1,6 @@
 """Pictures. Every function draws into given or new axes and returns them; no window opens."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from discs.arrays import Float
 from discs.pictures import figures as of_discs
 from discs.pictures import geometry
 from discs.pictures.figures import given_or_new
-from discs.pictures.style import BLUE, GREEN, GREY, LABEL, ORANGE, PURPLE
+from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE
 
 KIND = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
@@ -62,6 +62,32 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
     ax.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     ax.grid(alpha=0.3, which="major")
     return ax
+
+
+def loads(found: Mapping[str, Sequence[Study]]) -> Axes:
+    """Largest error of any field against the number of discs, a line for each load, a panel for each kind of ends."""
+    ends = list(dict.fromkeys(study.ends for studies in found.values() for study in studies))
+    figure = Figure(figsize=(4.2 * len(ends), 4.6), layout="constrained")
+    axes = figure.subplots(1, len(ends), squeeze=False, sharey=True)[0]
+    for ax, kind in zip(axes, ends, strict=True):
+        shown = [(name, study) for name, studies in found.items() for study in studies if study.ends == kind]
+        colours = GREY, ORANGE, BLUE, GREEN, PURPLE, INK
+        for i, (name, study) in enumerate(shown):
+            style = {"color": colours[i % len(colours)], "linestyle": "-" if i < len(colours) else "--"}
+            ax.loglog(study.n, study.error.max(axis=1), marker="o", markersize=4, label=name, **style)
+        n = shown[0][1].n[[0, -1]].astype(float)
+        level = min(study.error[0].max() for _, study in shown)
+        slope = 1 if kind == "springs" else 2
+        ax.loglog(n, 0.5 * level * (n / n[0]) ** -slope, color=GREY, linestyle=":", label=f"slope −{slope}")
+        ax.set(title=KIND[kind], xlabel="number of discs N")
+        ax.set_xticks(shown[0][1].n, minor=False)
+        ax.xaxis.set_major_formatter(ScalarFormatter())
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.grid(alpha=0.3, which="major")
+        ax.legend(fontsize=8)
+    axes[0].set_ylabel("largest error over discs and fields (length, rad)")
+    first: Axes = axes[0]
+    return first
 
 
 def motion(run: Solution, scene: Scene, arrows: int = 24, instants: int = 5) -> Figure:
