@@ -88,7 +88,8 @@ def balances(
     """
     if isinstance(rod, SteeredRod) or not isinstance(rod, Rod) or rod.curvature != "linear":
         raise ValueError(f"balances need a Rod with curvature='linear'; got {rod!r}")
-    if run.problem is not None and run.problem.loads:
+    scene = run.stats.get("scene")
+    if (run.problem is not None and run.problem.loads) or (isinstance(scene, dict) and scene.get("loads")):
         raise ValueError("balances are those of a rod without loads; got a run with some")
     frames, nodes = run.x.shape
     if frames < 3 or nodes <= DEGREE:

@@ -56,6 +56,9 @@ def solve(
     "leapfrog": the paper's explicit scheme on n points with step dt, by default as in the paper (32, k^2/8): plain springs, end
     discs of full weight, no error estimate.
 
+    Loads of a scene with slaved headings: "spectral" takes those of `continuum.load_terms` (see `continuum.weak`), "richardson" all
+    that discs take, "leapfrog" those with a potential. Steps do not jump over signals (`continuum.timing`).
+
     Parameters
     ----------
     scene : the scene.
@@ -70,9 +73,9 @@ def solve(
     Returns
     -------
     Solution on the nodes `s`. `error_estimate` has the errors of x, y, theta, omega, for a `SteeredRod` of phi and phi_rate, and of
-    the energy: its largest distance over all frames from the energy of the initial fields, by quadrature. The steps of the spectral
-    field conserve the energy to rounding (and to the tolerance of sweeps). At frames within steps it is the energy of the
-    interpolated fields, and has their error.
+    the energy: its largest distance over all frames from the energy of the initial fields, by quadrature (with loads, that of
+    energy - work + dissipated). The steps of the spectral field conserve the energy to rounding (and to the tolerance of sweeps).
+    At frames within steps it is the energy of the interpolated fields, and has their error.
 
     Raises
     ------

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from continuum import Rod, Scene, breathing_ring, solve, steered_rod, untwisting_rod
+from continuum.balance import balances
 from continuum.dispersion import response
 from continuum.spectral import Runner
+from discs import load
 from discs.loads import Custom, Damping, Force, Potential, Rest, Slope, Spring, Torque, signals
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
@@ -224,6 +226,16 @@ def test_a_scene_without_loads_computes_none():
 def test_loads_that_cannot_be_taken_are_refused(loads, message):
     with pytest.raises(ValueError, match=message):
         solve(straight(1.0, *loads) if isinstance(loads, tuple) else replace(straight(1.0), loads=loads), 1e-3, progress=False)
+
+
+def test_loaded_fields_are_saved_and_have_no_balances(tmp_path):
+    """The conservation laws are those of a rod without loads; a file keeps work and dissipation."""
+    scene = replace(untwisting_rod(duration=0.5), loads=(Torque(0.1, SMOOTH), Damping(rolling=0.2)))
+    run = solve(scene, 1e-3, progress=False)
+    with pytest.raises(ValueError, match="balances are those of a rod without loads"):
+        balances(scene.rod, run, scene.rolling)
+    run.save(tmp_path / "loaded.nc")
+    np.testing.assert_array_equal(load(tmp_path / "loaded.nc").dissipated, run.dissipated)
 
 
 def test_loads_of_rods_with_headings_and_of_the_paper_s_scheme_are_refused():
