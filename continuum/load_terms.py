@@ -11,13 +11,16 @@ from continuum.rod import Scene
 from discs import checks
 from discs.arrays import Float
 from discs.loads import Damping, Force, OnRod, Rest, Slope, Spring, Torque
-from discs.loads.signals import Signal, steady
+from discs.loads.binding import signal_of
+from discs.loads.signals import Signal
 
 X, Y, ROLL, TWIST = range(4)  # what a force acts on: x, y, theta, theta'
 
 
 def read(name: str, pattern: Any, s: Float, least: float | None = None) -> Float:
     """A pattern, a number or a function of s, at places (S,)."""
+    if not callable(pattern):
+        checks.number(name, pattern)
     found: Float = checks.field(name, pattern(s.copy()) if callable(pattern) else pattern, s.size, least=least)
     return found
 
@@ -64,6 +67,8 @@ class Terms:
         values = self.at(load, name)
         if load.at is None:
             return self.w * values
+        if callable(getattr(load, name)):
+            raise ValueError(f"{name} of {type(load).__name__} with at= is one number; got a function")
         there = self.s == load.at
         shared: Float = np.where(there, values, 0.0) / max(np.count_nonzero(there), 1)
         return shared
@@ -72,7 +77,8 @@ class Terms:
         push = np.zeros((4, self.s.size))
         for row, values in rows.items():
             push[row] = values
-        self.drives.append(Drive(push, steady() if load.signal is None else load.signal, type(load).__name__, strain))
+        name = type(load).__name__
+        self.drives.append(Drive(push, signal_of(name, load.signal), name, strain))
 
 
 @singledispatch

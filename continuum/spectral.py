@@ -152,7 +152,7 @@ def bent_hint(scene: Scene) -> str:
 
 def point_hint(scene: Scene) -> str:
     """A hint for scenes with a load at a point inside the rod; empty for others."""
-    points = [at for load in scene.loads if (at := getattr(load, "at", None)) is not None]
+    points = [at for load in scene.loads if isinstance(at := getattr(load, "at", None), int | float)]
     inside = [at for at in points if scene.closed or 0 < at < scene.rod.length]
     if not inside:
         return ""

@@ -40,6 +40,7 @@ from continuum.kernels.spectral_load import Load
 from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken, patterns, read
 from continuum.pieces import Sampled, split
 from continuum.timing import Timing
+from discs import checks
 from discs.arrays import Float
 from discs.loads import signals
 from discs.loads.signals import Signal
@@ -126,7 +127,7 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
             p = int(np.argmax(cut.lost))
             data.refuse(int(cut.worst[p]), f"is not finite and piecewise smooth at s = {cut.edges[p]:g}", "take one that is")
         edges = np.unique(np.concatenate([edges, cut.edges]))
-    points = [float(at) for load in scene.loads if (at := getattr(load, "at", None)) is not None]
+    points = [checks.number("at of a load", at) for load in scene.loads if (at := getattr(load, "at", None)) is not None]
     if bad := [at for at in points if not 0 <= at <= length]:
         raise ValueError(f"at of a load must be on the rod, from 0 to {length:g}; got {bad[0]:g}")
     x, w = legendre.leggauss(order)
