@@ -114,7 +114,9 @@ class RollingDiscs(SkewGradient):
         return None if self.order is None else np.argsort(self.order)
 
     def solve(self, secant: Secant, c: Float, g: complex, rhs: Float, d: complex = 0.0) -> Float:
-        """In O(n): for g > 0 by banded Cholesky, for a complex g by banded elimination.
+        """In O(n): for g > 0 by banded Cholesky, for a complex g, or with loads in steps back in time, by banded elimination.
+
+        Compositions have steps back in time, d < 0. Their matrix is not positive definite if dampers are stiff, or hold a disc.
 
         Always in double precision. That is enough for a correction, also to a state in extended precision (`longdouble`).
         """
@@ -130,16 +132,17 @@ class RollingDiscs(SkewGradient):
                 matrix[-len(viscous) :] += viscous
         rhs = rhs.astype(matrix.dtype)
         flat = rhs.ravel() if self.order is None else rhs.ravel()[self.order]
-        if np.iscomplexobj(matrix):
+        if np.iscomplexobj(matrix) or (self.load is not None and d.real < 0):
             width, n = len(matrix) - 1, matrix.shape[1]
-            full = np.zeros((3 * width + 1, n), complex, order="F")  # `width` more rows above for pivoting
+            full = np.zeros((3 * width + 1, n), matrix.dtype, order="F")  # `width` more rows above for pivoting
             for j in range(width + 1):
                 full[2 * width - j, j:] = full[2 * width + j, : n - j] = matrix[width - j, j:]
-            _, _, p, info = scipy.linalg.lapack.zgbsv(width, width, full, flat, overwrite_ab=True)
+            eliminate = scipy.linalg.lapack.zgbsv if np.iscomplexobj(matrix) else scipy.linalg.lapack.dgbsv
+            _, _, p, info = eliminate(width, width, full, flat, overwrite_ab=True)
         else:
             _, p, info = scipy.linalg.lapack.dpbsv(matrix, flat, overwrite_ab=True)
         if info:
-            p = np.full(flat.size, np.nan)  # not positive definite: C is not finite, or rounding dominates
+            p = np.full(flat.size, np.nan)  # C is not finite, or rounding dominates
         if self._inverse_order is not None:
             p = p[self._inverse_order]
         found: Float = p.reshape(rhs.shape)

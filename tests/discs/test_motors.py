@@ -119,3 +119,16 @@ def test_methods_that_take_no_motors_say_so(method):
     problem = uneven(7, KINDS[0])
     with pytest.raises(ValueError, match=f"'{method}' does not take motors; take an implicit method"):
         simulate(replace(problem, loads=(Motor(0.5, 0.0),)), method, 0.01, progress=False)
+
+
+@pytest.mark.parametrize("method", ["suzuki4", "kahanli6"])
+def test_steps_back_in_time_take_motors_and_stiff_dampers(method):
+    """The matrix of such a step is not positive definite; against Gauss steps, which go forward only."""
+    problem = driven(KINDS[0])
+    stiff = replace(problem, loads=(Damping(rolling=1e3),))
+    for loaded, near in ((problem, 1e-4), (stiff, 1e-5)):
+        run, other = (simulate(loaded, name, 0.02, 2, engine="plain", progress=False) for name in (method, "gauss6"))
+        assert np.isfinite(run.theta).all()
+        for name in ("x", "y", "theta"):
+            gap = np.abs(getattr(run, name) - getattr(other, name)).max()
+            assert gap < near, (name, gap)
