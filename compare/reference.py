@@ -16,7 +16,10 @@ def reference(problem: Problem, steps: int = 1000) -> tuple[Float, float]:
     return found[1], distance(found[0], found[1])
 
 
-def distance(q: Float, exact: Float) -> float:
-    """Largest difference, each row relative to its largest value; absolute of a row that is zero or rounding."""
-    size = np.abs(exact).max(axis=1, keepdims=True)
+def distance(q: Float, exact: Float, sizes: Float | None = None) -> float:
+    """Largest difference, each row relative to its largest value; absolute of a row that is zero or rounding.
+
+    sizes : (rows,), the values that differences are relative to; None for the largest of `exact`.
+    """
+    size = (np.abs(exact).max(axis=1) if sizes is None else sizes)[:, None]
     return float((np.abs(q - exact) / np.where(size > 1e-12, size, 1.0)).max())

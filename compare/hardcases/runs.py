@@ -42,7 +42,8 @@ class Found(NamedTuple):
     t : time reached. dt : step, NaN if the method chooses. error : largest, relative to the largest value of each of x, y, theta
     (or as the case defines it), NaN if unknown. energy : largest relative error over the frames, of peers at the end.
     residual : of rolling, length per time. says : its error or warnings. note : other measurements of the case.
-    off : largest error of positions and angles at the end, relative to the largest of each; NaN without a reference.
+    off : largest error of positions and angles at the end, relative to the largest of each in the motion, as tolerances are (at the
+        end for peers); NaN without a reference.
     """
 
     outcome: str
@@ -255,14 +256,15 @@ def motion(
     except ValueError as error:
         return Found("refused", 0.0, says=str(error))
     if method in PEERS:
-        found, q = peer(problem, method, seconds)
+        (found, q), sizes = peer(problem, method, seconds), None
     else:
         found, run = march(problem, method, step(problem) if step else None, seconds)
         q = None if run is None else np.array([getattr(run, row)[-1] for row in problem.system.rows])
+        sizes = None if run is None else np.array([np.abs(getattr(run, row)).max() for row in problem.system.rows])
         if run is not None and note is not None:
             found = found._replace(note=note(problem, run))
     known = None if q is None else reference_of(make, exact)
     if q is None or known is None:
         return found
-    off = distance(q, known)
-    return found._replace(off=off, error=off if compared or exact else np.nan)
+    at_the_end = distance(q, known) if compared or exact else np.nan
+    return found._replace(off=distance(q, known, sizes), error=at_the_end)

@@ -144,7 +144,7 @@ class Stability:
             "and the parasitic mode belongs to the two-step scheme. Bold: a method of ours that did not meet the expectation. "
             f"auto runs to {TOL:g}, default is `simulate(problem)` with nothing set, to {USUAL:g}; peers run to rtol {RTOL:g}; the "
             "energy of peers is that at the end, and their variables satisfy rolling exactly. error: as the case defines it; off: "
-            "of positions and angles at the end, relative to the largest of each. Seconds are processor time."
+            "of positions and angles at the end, relative to the largest of each in the motion. Seconds are processor time."
         )
 
     def report(self) -> str:

@@ -86,6 +86,7 @@ def test_what_stays_zero_is_compared_absolutely():
     exact, found = np.array([[1.0, 2.0], [0.0, 0.0]]), np.array([[1.0, 2.2], [0.0, 1e-3]])
     assert distance(found, exact) == pytest.approx(0.1)
     assert distance(found[:, :1], exact[:, :1]) == 0.0
+    assert distance(found, exact, np.array([4.0, 0.0])) == pytest.approx(0.05)
 
 
 def test_all_methods_take_turns():
