@@ -1,12 +1,12 @@
 """The loads of a scene at places along the rod: what each load of `discs.loads` is, in the terms of `continuum.weak`."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from continuum.load_places import read
 from continuum.rod import Scene
 from discs import checks
 from discs.arrays import Float
@@ -15,14 +15,6 @@ from discs.loads.binding import signal_of
 from discs.loads.signals import Signal
 
 X, Y, ROLL, TWIST = range(4)  # what a force acts on: x, y, theta, theta'
-
-
-def read(name: str, pattern: Any, s: Float, least: float | None = None) -> Float:
-    """A pattern, a number or a function of s, at places (S,)."""
-    if not callable(pattern):
-        checks.number(name, pattern)
-    found: Float = checks.field(name, pattern(s.copy()) if callable(pattern) else pattern, s.size, least=least)
-    return found
 
 
 class Drive(NamedTuple):
@@ -149,13 +141,3 @@ def _(load: Rest, to: Terms) -> None:
         to.strain += strain
     else:
         to.drive(load, {TWIST: root * strain}, strain)
-
-
-def patterns(loads: tuple[OnRod, ...]) -> dict[str, Callable[[Float], Float]]:
-    """The patterns of loads that are functions of s, by names for messages."""
-    found: dict[str, Callable[[Float], Float]] = {}
-    for i, load in enumerate(loads):
-        for name in (f.name for f in fields(load) if f.name != "signal"):  # type: ignore[arg-type]  # all are dataclasses
-            if callable(pattern := getattr(load, name)):
-                found[f"{name} of {type(load).__name__} {i}"] = pattern
-    return found

@@ -37,10 +37,9 @@ from numpy.polynomial import legendre
 from continuum.functions import Functions
 from continuum.initial import Resolved
 from continuum.kernels.spectral_load import Load
-from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken, patterns, read
-from continuum.pieces import Sampled, split
+from continuum.load_places import cut_patterns, point_loads
+from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken
 from continuum.timing import Timing
-from discs import checks
 from discs.arrays import Float
 from discs.loads import signals
 from discs.loads.signals import Signal
@@ -116,20 +115,9 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
     """
     scene = initial.scene
     check_taken(scene.loads)
-    length, given = scene.rod.length, patterns(scene.loads)
-    edges = initial.pieces
-    if given:
-        data = Sampled(lambda s: [read(name, f, s) for name, f in given.items()], length, tuple(given))
-        cut = split(data, np.array([0.0, length]))
-        if breaks := cut.breaks():
-            cut = split(data, np.array([0.0, *breaks, length]))
-        if cut.lost.any():
-            p = int(np.argmax(cut.lost))
-            data.refuse(int(cut.worst[p]), f"is not finite and piecewise smooth at s = {cut.edges[p]:g}", "take one that is")
-        edges = np.unique(np.concatenate([edges, cut.edges]))
-    points = [checks.number("at of a load", at) for load in scene.loads if (at := getattr(load, "at", None)) is not None]
-    if bad := [at for at in points if not 0 <= at <= length]:
-        raise ValueError(f"at of a load must be on the rod, from 0 to {length:g}; got {bad[0]:g}")
+    length, points = scene.rod.length, point_loads(scene)
+    cut = cut_patterns(scene)
+    edges = initial.pieces if cut is None else np.unique(np.concatenate([initial.pieces, cut.edges]))
     x, w = legendre.leggauss(order)
     half = np.diff(edges)[:, None] / 2
     s = np.concatenate([(edges[:-1, None] + half * (1 + x)).ravel(), points])
