@@ -166,8 +166,8 @@ def _studied(scene: Scene, n: tuple[int, ...], field: Solution, executor: Execut
 
 def _scene(page: Page, scene: Scene) -> None:
     rod = scene.rod
-    values = [(name.replace("_", " "), getattr(rod, name)) for name in ("length", "density", "spin_inertia", "torsion_stiffness")]
-    values += [(name.replace("_", " "), getattr(rod, name)) for name in ("bending_stiffness", "radius")]
+    names = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius")
+    values = [(name.replace("_", " "), "varies along the rod" if name in rod.varying else getattr(rod, name)) for name in names]
     page.add(
         "# N rolling discs and the rod they become",
         "N vertical discs roll on a plane without sliding, joined by springs that resist bending and torsion. As N grows they "

@@ -107,7 +107,8 @@ def balances(
     chord = advance * run.s  # r - chord is periodic
     r1, r2, r3, r4 = (along(r - chord, order) for order in (1, 2, 3, 4))
     r1 += advance
-    rho, alpha, beta, bend = rod.density, rod.spin_inertia, rod.torsion_stiffness, rod.bending_stiffness
+    same = rod.uniform("balances")
+    rho, alpha, beta, bend, radius = same.density, same.spin_inertia, same.torsion_stiffness, same.bending_stiffness, same.radius
     if rolling is None:
         if run.x_rate is None or run.y_rate is None or run.tension is None:
             raise ValueError("rolling=None needs a motion of the free rod, with x_rate, y_rate and tension")
@@ -115,9 +116,9 @@ def balances(
         e = force = np.zeros_like(r)
     else:
         law = ROLLING[checks.choice("rolling", rolling, ROLLING)]
-        e, p = law.arm(rod.radius, r1) * _turned(r1), np.zeros_like(omega)
+        e, p = law.arm(radius, r1) * _turned(r1), np.zeros_like(omega)
         v = e * omega
-        e_rate = rod.radius * _turned(law.rate(r1, along(v)))
+        e_rate = radius * _turned(law.rate(r1, along(v)))
         torque = beta * along(run.theta, 2) - bend * _dot(e, r4) - rho * omega * _dot(e, e_rate)
         force = rho * (e * torque / (alpha + rho * _dot(e, e)) + e_rate * omega) + bend * r4
     n = p * r1 - bend * r3

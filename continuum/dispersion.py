@@ -32,8 +32,8 @@ def frequency(rod: Rod, q: ArrayLike, k: float | None = None) -> Float:
     q : wave numbers, 1/length.
     k : spacing of discs; None for the field.
     """
-    t, _ = symbols(q, k)
-    return np.sqrt((rod.torsion_stiffness * t + rod.bending_stiffness * rod.radius**2 * t**2) / rod.inertia)
+    (t, _), p = symbols(q, k), rod.uniform("frequency")
+    return np.sqrt((p.torsion_stiffness * t + p.bending_stiffness * p.radius**2 * t**2) / p.inertia)
 
 
 def response(rod: Rod, q: ArrayLike, rate: float, rolling: float = 0.0, torsion: float = 0.0, k: float | None = None) -> Complex:
@@ -68,15 +68,15 @@ def growth(rod: Rod, q: ArrayLike, omega: float, rolling: str = "field", k: floa
     Field law: sigma -> omega sqrt(beta/K) as q -> infinity; it is unbounded in q if K = 0. Unit law: sigma = 0.
     """
     gamma = stretching(ROLLING[checks.choice("rolling", rolling, ROLLING)])
-    t, c = symbols(q, k)
-    r2, push = rod.radius**2, gamma * (omega * c) ** 2
-    b = rod.torsion_stiffness * t + rod.bending_stiffness * r2 * t**2 - rod.spin_inertia * r2 * push
-    last = rod.torsion_stiffness * r2 * push * t
-    root = np.emath.sqrt(b**2 + 4 * rod.inertia * last)
+    (t, c), p = symbols(q, k), rod.uniform("growth")
+    r2, push = p.radius**2, gamma * (omega * c) ** 2
+    b = p.torsion_stiffness * t + p.bending_stiffness * r2 * t**2 - p.spin_inertia * r2 * push
+    last = p.torsion_stiffness * r2 * push * t
+    root = np.emath.sqrt(b**2 + 4 * p.inertia * last)
     # the larger root of M u^2 + b u - last, in the form without cancellation for each sign of b
     with np.errstate(divide="ignore", invalid="ignore"):
-        square = np.where(b > 0, 2 * last / (root + b), (root - b) / (2 * rod.inertia))
-    growing: Float = np.emath.sqrt(np.where(last == 0, np.maximum(-b, 0) / rod.inertia, square)).real
+        square = np.where(b > 0, 2 * last / (root + b), (root - b) / (2 * p.inertia))
+    growing: Float = np.emath.sqrt(np.where(last == 0, np.maximum(-b, 0) / p.inertia, square)).real
     return growing
 
 
@@ -95,14 +95,14 @@ def steered_frequencies(rod: SteeredRod, q: ArrayLike, k: float | None = None) -
     -------
     (2, ...) : the slower and the faster branch, for q of any shape.
     """
-    t, _ = symbols(q, k)
+    (t, _), p = symbols(q, k), rod.uniform("steered_frequencies")
     c2 = np.ones_like(t) if k is None else np.cos(np.asarray(q) * k / 2) ** 2
-    g, r2 = rod.shear_stiffness, rod.radius**2
-    roll = (rod.torsion_stiffness + g * r2) * t / rod.inertia
-    turn = (rod.bending_stiffness * t + g * c2) / rod.heading_inertia
-    coupling = g**2 * r2 * t * c2 / (rod.inertia * rod.heading_inertia)
+    g, r2 = p.shear_stiffness, p.radius**2
+    roll = (p.torsion_stiffness + g * r2) * t / p.inertia
+    turn = (p.bending_stiffness * t + g * c2) / p.heading_inertia
+    coupling = g**2 * r2 * t * c2 / (p.inertia * p.heading_inertia)
     fast = 0.5 * (roll + turn) + np.sqrt(0.25 * (roll - turn) ** 2 + coupling)
     # the product of the roots without the cancellation: (beta + G R^2) t (K t + G c^2) - G^2 R^2 t c^2
-    product = t * (rod.torsion_stiffness * (rod.bending_stiffness * t + g * c2) + g * r2 * rod.bending_stiffness * t)
-    slow = product / (rod.inertia * rod.heading_inertia * fast)
+    product = t * (p.torsion_stiffness * (p.bending_stiffness * t + g * c2) + g * r2 * p.bending_stiffness * t)
+    slow = product / (p.inertia * p.heading_inertia * fast)
     return np.sqrt(np.stack([slow, fast]))

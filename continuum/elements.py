@@ -13,8 +13,9 @@ and rolling is r. = e theta., e = R (-sin phi, cos phi). For admissible variatio
 with n = T(phi) (A Gamma_1, G Gamma_2). The natural end conditions are e.n + beta theta' = 0 and K phi' = 0.
 
 Integrals are replaced by Gauss-Lobatto sums over elements with polynomials of degree p (weights w, derivative D), for fields and
-variations alike. The inertia of the nodes is then diagonal, and the energy of the sums is constant. n . (e psi)' is computed as a
-force -D^T w n on r, projected on e. Time is integrated by DOP853, with an error far below that of the elements.
+variations alike; parameters that vary are taken at the nodes. The inertia of the nodes is then diagonal, and the energy of the sums
+is constant. n . (e psi)' is computed as a force -D^T w n on r, projected on e. Time is integrated by DOP853, with an error far
+below that of the elements.
 
 The method is independent of the chain of discs: it shares only the equations.
 """
@@ -27,8 +28,9 @@ import scipy  # its parts, slow to import, when they are used
 from numpy.polynomial import legendre
 
 from continuum.initial import resolve
+from continuum.parameters import Section, sample
 from continuum.pieces import POINTS
-from continuum.rod import Scene, SteeredRod
+from continuum.rod import Scene
 from discs.arrays import Float, Int
 
 DEGREE = 10
@@ -124,27 +126,31 @@ class Elements:
         cos, sin = np.cos(values[3]), np.sin(values[3])
         return np.stack([cos * dx + sin * dy, cos * dy - sin * dx]), twist, bend, np.stack([cos, sin])
 
+    @cached_property
+    def _at_nodes(self) -> Section[Float]:
+        return self.scene.rod.at(self.s)
+
+    @cached_property
+    def _in_elements(self) -> Section[Float]:
+        x, width = self._rule[0], self.scene.rod.length / self.count
+        return self.scene.rod.at(np.minimum(width * (np.arange(self.count)[:, None] + (x + 1) / 2), self.scene.rod.length))
+
     def energy(self, q: Float) -> float:
         """Kinetic and potential energy of (6, n)."""
-        rod = self._rod
+        rod, there = self._at_nodes, self._in_elements
         u, twist, bend, _ = self._strains(q)
-        stiffness = np.array([rod.stretch_stiffness, rod.shear_stiffness, rod.torsion_stiffness, rod.bending_stiffness])
-        density = np.tensordot(stiffness, np.stack([u[0] - 1, u[1], twist, bend]) ** 2, axes=1)
+        stiffness = there.stretch_stiffness, there.shear_stiffness, there.torsion_stiffness, there.bending_stiffness
+        density = sum(k * strain**2 for k, strain in zip(stiffness, (u[0] - 1, u[1], twist, bend), strict=True))
         kinetic = self.weights @ (rod.inertia * q[4] ** 2 + rod.heading_inertia * q[5] ** 2)
         return 0.5 * float((self._rule[1] * density).sum() + kinetic)
 
-    @property
-    def _rod(self) -> SteeredRod:
-        assert isinstance(self.scene.rod, SteeredRod)  # `solve` takes this method for no other rod
-        return self.scene.rod
-
     def rate(self, _: float, flat: Float) -> Float:
         """The time derivative of the unknowns, flat."""
-        rod, (w, d) = self._rod, self._rule[1:]
+        rod, there, (w, d) = self._at_nodes, self._in_elements, self._rule[1:]
         q = flat.reshape(6, -1)
         u, twist, bend, (cos, sin) = self._strains(q)
-        n1, n2 = rod.stretch_stiffness * (u[0] - 1), rod.shear_stiffness * u[1]
-        flux = np.stack([cos * n1 - sin * n2, sin * n1 + cos * n2, rod.torsion_stiffness * twist, rod.bending_stiffness * bend])
+        n1, n2 = there.stretch_stiffness * (u[0] - 1), there.shear_stiffness * u[1]
+        flux = np.stack([cos * n1 - sin * n2, sin * n1 + cos * n2, there.torsion_stiffness * twist, there.bending_stiffness * bend])
         local = -(w * flux) @ d
         local[3] += w * (u[0] * n2 - u[1] * n1)
         force = self._sum(local)
@@ -164,14 +170,20 @@ class Elements:
 
     @cached_property
     def misfit(self) -> dict[str, float]:
-        """Largest difference between the initial fields and their polynomials on the elements, for each field."""
+        """Largest difference between the initial fields and their polynomials on the elements, for each field; also for parameters
+        of the rod that vary, over their range."""
         s, _ = resolve(self.scene).quadrature(POINTS)
-        truth = self.scene.fields(s)
+        truth, parameters = self.scene.fields(s), [*self.scene.rod.varying]
+        there = [getattr(self._in_elements, name) for name in parameters]
+        known = np.concatenate([self.local(self.start), self.start[4:, self._index], *(values[None] for values in there)])
         at = s / self.scene.rod.length * self.count
         element = np.minimum(at.astype(int), self.count - 1)
-        values = np.concatenate([self.local(self.start), self.start[4:, self._index]]) @ self._expand.T
-        found = np.einsum("fsk,sk->fs", values[:, element], legendre.legvander(2 * (at - element) - 1, DEGREE))
-        return {name: float(np.abs(row - truth[name]).max()) for name, row in zip(UNKNOWNS, found, strict=True)}
+        found = np.einsum("fsk,sk->fs", (known @ self._expand.T)[:, element], legendre.legvander(2 * (at - element) - 1, DEGREE))
+        off = {name: float(np.abs(row - truth[name]).max()) for name, row in zip(UNKNOWNS, found, strict=False)}
+        for name, row in zip(parameters, found[len(UNKNOWNS) :], strict=True):
+            value = sample(name, self.scene.rod.varying[name], s)
+            off[name] = float(np.abs(row - value).max() / max(np.ptp(value), 1e-9 * value.max()))
+        return off
 
     def run(self, times: Float, tol: float) -> Float:
         """The unknowns at the times, (F, 6, n), with an error of the time steps below tol."""

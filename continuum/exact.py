@@ -66,13 +66,13 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
     omega = checks.number("omega", omega)
     if n is not None:
         n = checks.whole("n (discs of a ring)", n, 5)
-    a0 = rod.length / (2 * np.pi)
+    a0, p = rod.length / (2 * np.pi), rod.uniform("ring")
     k = rod.length if n is None else rod.length / n
     g = 1.0 if n is None else a0 / k * np.sin(2 * np.pi / n)
     b = 1 / a0**2 if n is None else (2 / k * np.sin(np.pi / n)) ** 2
-    r, stiffness = rod.radius, rod.bending_stiffness * b**2
+    r, stiffness = p.radius, p.bending_stiffness * b**2
     if rolling == "unit":  # closed form
-        pull = r * stiffness / rod.inertia
+        pull = r * stiffness / p.inertia
         nu = np.sqrt(r * pull)
         end = _collapse(a0, r * omega, nu)
         if t[-1] >= end:
@@ -88,8 +88,8 @@ def ring(rod: Rod, t: ArrayLike, omega: float, rolling: str = "field", n: int | 
         a, _, omega = state
         z, along = np.array([g * a / a0, 0.0]), np.array([1.0, 0.0])
         h, slope = float(law.size(z[0])), float(law.rate(z, along)[0])
-        inertia = rod.spin_inertia + rod.density * r**2 * h**2
-        return [-r * h * omega, omega, r * h * (rod.density * r**2 * h * slope * omega**2 * g / a0 + stiffness * a) / inertia]
+        inertia = p.spin_inertia + p.density * r**2 * h**2
+        return [-r * h * omega, omega, r * h * (p.density * r**2 * h * slope * omega**2 * g / a0 + stiffness * a) / inertia]
 
     span = 0.0, max(float(t[-1]), 1e-300)
     found = scipy.integrate.solve_ivp(
@@ -116,7 +116,7 @@ def rolling_line(rod: Rod, s: ArrayLike, t: ArrayLike, omega: float) -> Motion:
     """
     s, t, omega = *_axes(s, t), checks.number("omega", omega)
     theta = omega * t + 0 * s
-    return Motion(s + 0 * t, rod.radius * theta, theta, np.full_like(theta, omega))
+    return Motion(s + 0 * t, rod.uniform("rolling_line").radius * theta, theta, np.full_like(theta, omega))
 
 
 def standing_wave(
@@ -165,8 +165,8 @@ def standing_wave(
         raise ValueError(f"mode must be at most {most} for {n} discs; got {mode}")
     q, shape = _shape(rod, 2 * mode if closed else mode, closed, k)
     omega = float(frequency(rod, q, k))
-    theta = checks.number("amplitude", amplitude) * shape(s)
-    return Motion(s + 0 * t, rod.radius * theta * np.cos(omega * t), theta * np.cos(omega * t), -omega * theta * np.sin(omega * t))
+    theta, radius = checks.number("amplitude", amplitude) * shape(s), rod.uniform("standing_wave").radius
+    return Motion(s + 0 * t, radius * theta * np.cos(omega * t), theta * np.cos(omega * t), -omega * theta * np.sin(omega * t))
 
 
 def growing_wave(
@@ -201,11 +201,12 @@ def growing_wave(
     s, t, omega = *_axes(s, t), checks.number("omega", omega)
     q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
     k = None if n is None else rod.length / checks.whole("n (discs of a ring)", n, 5)
-    sigma, g = float(growth(rod, q, omega, rolling, k)), rod.radius * omega * float(symbols(q, k).first)
+    radius = rod.uniform("growing_wave").radius
+    sigma, g = float(growth(rod, q, omega, rolling, k)), radius * omega * float(symbols(q, k).first)
     if not sigma:
         raise ValueError(f"wave {mode} does not grow at omega = {omega:g}; see standing_wave")
     a = checks.number("amplitude", amplitude) * np.exp(sigma * t)
-    b, wave = rod.radius * sigma**2 / (sigma**2 - gamma * g**2) * a, np.cos(q * s)
+    b, wave = radius * sigma**2 / (sigma**2 - gamma * g**2) * a, np.cos(q * s)
     line = rolling_line(rod, s[0], t[:, 0], omega)
     return Motion(line.x + g / sigma * b * np.sin(q * s), line.y + b * wave, line.theta + a * wave, line.omega + sigma * a * wave)
 
@@ -217,18 +218,19 @@ def _axes(s: ArrayLike, t: ArrayLike) -> tuple[Float, Float]:
 
 def _shape(rod: Rod, mode: int, closed: bool, k: float | None) -> tuple[float, Callable[[Float], Float]]:
     """Wave number q and shape g of a standing wave; see `standing_wave`."""
-    length, bend = rod.length, rod.bending_stiffness * rod.radius**2
+    uniform = rod.uniform("standing_wave")
+    length, torsion, bend = rod.length, uniform.torsion_stiffness, uniform.bending_stiffness * uniform.radius**2
     if closed or not bend:
         q = np.pi * mode / length
         return q, lambda s: np.cos(q * s)
-    if mode == 1 and not rod.torsion_stiffness:
+    if mode == 1 and not torsion:
         raise ValueError("mode 1 with free ends needs a positive torsion_stiffness: without it the whole rod turns; got 0")
     half, odd = length / 2, mode % 2 == 1
 
     def ratios(q: float) -> tuple[float, float, float]:
         """p, q^2/p^2 and q/p; with n discs their counterparts."""
         second, first = symbols(q, k)
-        square = second + rod.torsion_stiffness / bend
+        square = second + torsion / bend
         p = np.sqrt(square) if k is None else 2 / k * np.arcsinh(np.sqrt(square) * k / 2)
         return float(p), float(second / square), float(first / (p if k is None else np.sinh(p * k) / k))
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from continuum.rod import Scene
+from continuum import parameters
+from continuum.rod import PARAMETERS, Scene
 from continuum.scenes import LAW, SCENES, steered_rod
 from discs import checks
 from discs.arrays import Float
@@ -35,8 +36,13 @@ def read_scene(path: str | Path) -> Scene:
         at = 0.0
         signal = { name = "sine", amplitude = 1.0, rate = 2.0 }
 
-    Each table `loads` is a load of `discs.loads` with numbers for patterns, `signal` one of `discs.loads.signals`. The signal
-    "table" has its t and values, or `file`, a CSV file beside this one with a line "t, value" for each time.
+    A parameter of the rod that varies is a table, one of `continuum.parameters`:
+
+        density = { name = "polynomial", coefficients = [1.0, 0.25] }
+        radius = { name = "table", s = [0.0, 2.0, 4.0], values = [1.0, 0.7, 0.8] }
+
+    Each table `loads` is a load of `discs.loads` with numbers for patterns, `signal` one of `discs.loads.signals`. A table of
+    a signal or of a parameter has its values, or `file`, a CSV file beside this one with a line "t, value" or "s, value" for each.
 
     Raises
     ------
@@ -55,7 +61,11 @@ def read_scene(path: str | Path) -> Scene:
         checks.choice(f"key of {make.__name__}", key, (*named, *PAPER, *(LAW if make is not steered_rod else ())))
     if not isinstance(loads, list):
         raise ValueError(f"loads of a scene file are tables [[loads]]; got {checks.shown(loads)}")
-    return replace(make(**content), loads=tuple(_load(load, Path(path).parent) for load in loads))
+    folder = Path(path).parent
+    for key, value in content.items():
+        if key in PARAMETERS and isinstance(value, dict):
+            content[key] = _named(key, value, parameters.NAMES, folder)
+    return replace(make(**content), loads=tuple(_load(load, folder) for load in loads))
 
 
 def _load(given: Any, folder: Path) -> OnRod:
@@ -67,25 +77,28 @@ def _load(given: Any, folder: Path) -> OnRod:
     _check_keys(kind, values)
     for key in values.keys() & {"signal", "rate"}:
         if key == "signal" or isinstance(values[key], dict):
-            values[key] = _signal(values[key], folder)
+            values[key] = _named("signal", values[key], signals.NAMES, folder)
     load: OnRod = kind(**values)
     return load
 
 
-def _signal(given: Any, folder: Path) -> signals.Named:
-    """A signal from its table."""
+def _named(key: str, given: Any, known: dict[str, Any], folder: Path) -> Any:
+    """A signal, or a parameter of the rod that varies, from its table."""
     if not isinstance(given, dict) or "name" not in given:
-        raise ValueError(f'signal must be a table with its name, as {{ name = "sine", ... }}; got {checks.shown(given)}')
-    kind = signals.NAMES[checks.choice("signal", given["name"], signals.NAMES)]
-    values = {key: value for key, value in given.items() if key != "name"}
-    if kind is signals.table and "file" in values:
-        t, level = _columns(folder / str(values.pop("file")))
-        values |= {"t": t, "values": level}
+        raise ValueError(
+            f'{key} must be a table with its name, as {{ name = "{next(iter(known))}", ... }}; got {checks.shown(given)}'
+        )
+    kind = known[checks.choice(key, given["name"], known)]
+    values = {name: value for name, value in given.items() if name != "name"}
+    if given["name"] == "table" and "file" in values:
+        values |= dict(
+            zip((f.name for f in fields(kind)), _columns(folder / str(values.pop("file")), fields(kind)[0].name), strict=True)
+        )
     _check_keys(kind, values)
     return kind(**values)
 
 
-def _check_keys(kind: type, values: dict[str, Any]) -> None:
+def _check_keys(kind: Any, values: dict[str, Any]) -> None:
     """ValueError unless the values are those of the fields of a dataclass, with none missing."""
     known = {f.name: f.default is MISSING for f in fields(kind)}
     for key in values:
@@ -94,15 +107,15 @@ def _check_keys(kind: type, values: dict[str, Any]) -> None:
         raise ValueError(f"{kind.__name__} needs {', '.join(missing)}; got {checks.shown(values)}")
 
 
-def _columns(path: Path) -> Float:
+def _columns(path: Path, first: str) -> Float:
     """The two columns of a CSV file, (2, m)."""
     try:
         with open(opened(path), encoding="utf-8") as file:
             found = np.loadtxt(file, delimiter=",", ndmin=2, max_rows=MOST_ROWS)
     except (ValueError, UnicodeError) as error:
-        raise ValueError(f"{path} must be lines 't, value': {error}") from None
+        raise ValueError(f"{path} must be lines '{first}, value': {error}") from None
     if found.shape[1] != 2:
-        raise ValueError(f"{path} must be lines 't, value'; got {found.shape[1]} columns")
+        raise ValueError(f"{path} must be lines '{first}, value'; got {found.shape[1]} columns")
     columns: Float = found.T
     return columns
 

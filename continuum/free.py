@@ -68,7 +68,7 @@ def free_rod(
     """
     if not isinstance(rod, Rod) or rod.curvature != "linear":
         raise ValueError(f"free_rod needs a Rod with curvature='linear'; got {rod!r}")
-    if not rod.spin_inertia:
+    if not rod.uniform("free_rod").spin_inertia:
         raise ValueError("the free rod needs a positive spin_inertia: without rolling, theta has no other inertia; got 0")
     for name, flag in (("closed", closed), ("estimate", estimate)):
         if not isinstance(flag, bool):

@@ -197,9 +197,10 @@ def _scales(rod: Rod, chain: Chain, fields: dict[str, Float]) -> tuple[dict[str,
     about = float(np.hypot(*(fields[v] - fields[v].mean(axis=1, keepdims=True) for v in ("x_rate", "y_rate"))).max())
     scales = dict.fromkeys(("x", "y"), rod.length) | dict.fromkeys(("x_rate", "y_rate"), about) | {"tension": large["tension"]}
     scales |= {name: float(np.ptp(fields[name], axis=1).max()) for name in ("theta", "omega")}
-    swings = speed + place * np.sqrt(rod.bending_stiffness / rod.density) / rod.length**2
-    twists = large["omega"] + large["theta"] * np.sqrt(rod.torsion_stiffness / rod.spin_inertia) / rod.length
-    pulls = rod.bending_stiffness * (1 / rod.length**2 + 1e-5 * place / chain.k**3)  # from third differences
+    p = rod.uniform("free_rod")
+    swings = speed + place * np.sqrt(p.bending_stiffness / p.density) / rod.length**2
+    twists = large["omega"] + large["theta"] * np.sqrt(p.torsion_stiffness / p.spin_inertia) / rod.length
+    pulls = p.bending_stiffness * (1 / rod.length**2 + 1e-5 * place / chain.k**3)  # from third differences
     rounding = {
         "x": place,
         "y": place,

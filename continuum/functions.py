@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from continuum.density import Density
 from continuum.elements import lobatto
+from continuum.parameters import sample
+from continuum.rod import Rod
 from discs.arrays import Float
 
 FINER = 1.5  # points per node: products of three polynomials are integrated exactly
+SOFTEST = 1e-4  # least bending stiffness over the largest
 
 Coefficients: TypeAlias = NDArray[np.floating]  # of polynomials, as NumPy's stubs have them
 
@@ -26,7 +29,7 @@ class Derivatives(Protocol):
 class Functions(NamedTuple):
     """n functions of s. The line is given by coefficients, roll and its rate by values at nodes.
 
-    s, w : (n,), the nodes and their shares of the length.
+    s, w : (n,), the nodes and their shares of the length. there, shares : (F,), the same for the finer points.
     bends : (n + 3 F, n), from coefficients to z at the nodes, then to z, z', z'' at F finer points (less the shift of a closed
         rod). They are for headings: the highest functions are damped by `smooth`.
     rates : (3 F, n), from values at the nodes to the field and its two derivatives at the finer points.
@@ -39,6 +42,8 @@ class Functions(NamedTuple):
 
     s: Float
     w: Float
+    there: Float
+    shares: Float
     bends: Float
     rates: Float
     project: Float
@@ -113,6 +118,8 @@ def polynomials(n: int, density: Density) -> Functions:
     return Functions(
         s=s,
         w=w / density.rate(s),
+        there=there,
+        shares=wf,
         bends=np.vstack([slope(x), slope(fine), *curved]) * smooth(np.concatenate([[0, 0], np.arange(n - 2) / (n - 3)])),
         rates=np.vstack(rates),
         project=project,
@@ -146,6 +153,8 @@ def waves(n: int, density: Density) -> Functions:
     return Functions(
         s=s,
         w=np.full(n, length / n),
+        there=fine,
+        shares=np.full(count, length / count),
         bends=np.vstack([value(s, 1), *(value(fine, m) for m in (1, 2, 3))]) * smooth(np.concatenate([[0], q / q[-1]])),
         rates=np.vstack([value(fine, m) @ fit for m in range(3)]),
         project=project,
@@ -154,4 +163,67 @@ def waves(n: int, density: Density) -> Functions:
         line=value,
         field=lambda s, m=0: value(s, m) @ fit,
         ends=0,
+    )
+
+
+def unresolved(given: Functions, rod: Rod, s: Float, w: Float) -> float:
+    """The part of a rod's parameters that functions miss, 0 if none varies: the largest int |p - p through its nodes|/int p.
+
+    s, w : places and weights (S,) of a quadrature.
+    """
+    missed = [0.0]
+    for name, function in rod.varying.items():
+        known, there = (sample(name, function, places) for places in (given.s, s))
+        missed.append(float(w @ np.abs(given.field(s) @ known - there)) / max(float(w @ there), 1e-300))
+    return max(missed)
+
+
+def weighted(given: Functions, rod: Rod) -> Functions:
+    """Functions with the parameters of a rod that vary in their integrals, K, beta and R: with them K = beta = R = 1.
+
+    The weak form keeps its shape, with
+
+        int K Re(conj(r'') (e psi)'') + beta theta' psi',   e psi = i h(z) (R psi).
+
+    r'' is expanded in functions that are orthonormal with the weight K: if G = L L^T is the matrix of int K phi_k phi_l for the
+    given ones, the coefficients a = L^-T b have int K |r''|^2 = |b|^2. P projects with this weight, so that int K Re(conj(r'') f'')
+    is still the same for f and P f, for every r''. R psi is the function through R psi at the nodes: columns of matrices that act
+    on psi there are multiplied by R, and R is not differentiated.
+
+    Raises
+    ------
+    ValueError : where K is below a ten-thousandth of its largest value: a line that rolls and does not bend is ill posed.
+    """
+    at, nodes = rod.at(given.there), rod.at(given.s)
+    softest = int(np.argmin(nodes.bending_stiffness))
+    if nodes.bending_stiffness.ndim and nodes.bending_stiffness[softest] < SOFTEST * nodes.bending_stiffness.max():
+        raise ValueError(
+            f"bending_stiffness must not fall below {SOFTEST:g} of its largest value for method='spectral', as functions do not "
+            f"resolve motions there; got {nodes.bending_stiffness[softest]:.3g} at s = {given.s[softest]:.4g}: take a larger one, "
+            "or method='richardson'"
+        )
+    first = int(np.count_nonzero(given.bending == 0))  # coefficients that do not bend
+    finer = given.there.size
+    bent = given.project[first:, :finer] * given.bending[first:, None]  # the second derivatives, times the shares
+    heavy = bent * at.bending_stiffness
+    back = np.linalg.inv(np.linalg.cholesky(heavy @ (bent / given.shares).T))
+    project = given.project.copy()
+    project[first:, :finer] = back @ heavy
+    project[:, finer:] *= nodes.radius
+    bends = given.bends.copy()
+    bends[:, first:] = bends[:, first:] @ back.T
+    twist = given.rates[finer : 2 * finer]
+
+    def line(s: Float) -> Float:
+        values = given.line(s)
+        values[:, first:] = values[:, first:] @ back.T
+        return values
+
+    return given._replace(
+        bends=bends,
+        rates=given.rates * nodes.radius,
+        project=project,
+        bending=np.where(given.bending == 0, 0.0, 1.0),
+        torsion=(twist.T * (given.shares * at.torsion_stiffness)) @ twist,
+        line=line,
     )

@@ -18,15 +18,18 @@ is a skew-gradient system q. = C pi, pi. = - C^T grad V with the quadratic V = i
 conserve its energy. The unknowns are the coefficients of r'' and the ends, so only omega is differentiated, and no digits are lost.
 Integrals with e take 1.5 points per node, which is exact for the field law.
 
+**Parameters that vary** stand in these integrals, rho and alpha at the nodes (`continuum.functions.weighted`), as the density
+rho |r.|^2/2 + alpha theta.^2/2 - beta theta'^2/2 - K |r''|^2/2 with functions of s has them. End conditions are natural ones.
+
 **Initial fields** are projected, not sampled at the nodes, so features between the nodes are not missed. With theta =
 theta_0(s) + vartheta, the initial twist enters only V = int beta vartheta'^2/2 + K |r''|^2/2 + f . vartheta + const, by its moment
 with each function,
 
     f_k = int beta theta_0' psi_k' = beta ([theta_0 psi_k'] - int theta_0 psi_k''),
 
-computed by a quadrature that resolves theta_0 (`continuum.initial`); no derivative of theta_0 is needed. vartheta is smoother than
-theta_0, so a twist much narrower than the functions costs little accuracy where the rod rolls. r is fitted by least squares in s.
-omega at a node is the mean of the initial omega weighted by the function of the node.
+computed by a quadrature that resolves theta_0 (`continuum.initial`); no derivative of theta_0 is needed, unless beta varies.
+vartheta is smoother than theta_0, so a twist much narrower than the functions costs little accuracy where the rod rolls. r is
+fitted by least squares in s. omega at a node is the mean of the initial omega weighted by the function of the node.
 """
 
 from collections.abc import Callable
@@ -36,7 +39,7 @@ from typing import NamedTuple
 import numpy as np
 
 from continuum.density import Density
-from continuum.functions import polynomials, waves
+from continuum.functions import polynomials, waves, weighted
 from continuum.initial import Resolved, resolve
 from continuum.kernels.spectral import Spectral
 from continuum.kernels.spectral_load import NONE
@@ -74,7 +77,7 @@ class SpectralRod(SkewGradient):
     closed : whether the rod is closed.
     twist : (n,), the moment f of the initial twist.
     loads : the loads of the scene, None if there are none.
-    crossing : the time in which a wave as long as the rod crosses it, over 2 pi.
+    crossing : the time in which a wave as long as the rod crosses it, over 2 pi, where it is fastest.
     start : the initial state.
     """
 
@@ -84,16 +87,23 @@ class SpectralRod(SkewGradient):
     def __init__(self, scene: Scene, n: int, density: Density | None = None) -> None:
         rod = scene.rod
         self.closed = scene.closed
-        self.n, self.law, self._radius, self._scene = n, ROLLING[scene.rolling], rod.radius, scene
+        self.n, self.law, self._scene = n, ROLLING[scene.rolling], scene
         self.functions = (waves if scene.closed else polynomials)(n, density or Density(rod.length))
+        nodes, self._rolls = rod.at(self.functions.s), np.ones(())  # radius at the nodes over self._radius
+        mass, bending, torsion, self._radius = nodes.density, nodes.bending_stiffness, nodes.torsion_stiffness, 1.0
+        if rod.varying:
+            self.functions, self._rolls = weighted(self.functions, rod), nodes.radius
+            mass, bending, torsion = mass * nodes.radius**2, np.ones(()), np.ones(())
+        else:
+            self._radius = float(nodes.radius)
         self.scale = np.array([rod.length, rod.length, 1.0])
-        self.bending, self.torsion = rod.bending_stiffness * self.functions.bending, rod.torsion_stiffness * self.functions.torsion
+        self.bending, self.torsion = bending * self.functions.bending, torsion * self.functions.torsion
         self._rates, self._bends, self._project = (
             np.ascontiguousarray(matrix.T) for matrix in (self.functions.rates, self.functions.bends, self.functions.project)
         )
-        self._mass, self._spin = self.functions.w * rod.density, self.functions.w * rod.spin_inertia
-        stiffness = rod.torsion_stiffness * rod.length**2 + rod.bending_stiffness * rod.radius**2
-        self.crossing = rod.length**2 * np.sqrt(rod.inertia / stiffness) if stiffness else np.inf
+        self._mass, self._spin = self.functions.w * mass, self.functions.w * nodes.spin_inertia
+        stiffest = float(np.max(nodes.torsion_stiffness * rod.length**2 + nodes.bending_stiffness * nodes.radius**2))
+        self.crossing = rod.length**2 * np.sqrt(float(np.min(nodes.inertia)) / stiffest) if stiffest else np.inf
         self._shift = complex(*scene.shift) / rod.length  # mean slope of a closed rod; z is the slope of the series plus this
         self.twist, self._offset = np.zeros(n), 0.0
         initial = resolve(scene)
@@ -129,14 +139,15 @@ class SpectralRod(SkewGradient):
 
     def _start(self, initial: Resolved) -> Phase:
         """The initial state. Also sets the twist, and the constant of V that makes the energy that of the initial fields."""
-        scene, functions = self._scene, self.functions
-        s, w = initial.quadrature(DATA + self.n // 2)
+        scene, functions, order = self._scene, self.functions, DATA + self.n // 2
+        s, w = initial.quadrature(order)
         fields, ends = scene.fields(s), np.array([0.0, scene.rod.length])
-        at_ends = scene.fields(ends)
-        moment = functions.field(ends, 1).T @ (np.array([-1, 1]) * at_ends["theta"]) - functions.field(s, 2).T @ (
-            w * fields["theta"]
-        )
-        self.twist = scene.rod.torsion_stiffness * moment
+        at_ends, beta = scene.fields(ends), scene.rod.at(s).torsion_stiffness
+        if beta.ndim:
+            self.twist = functions.field(s, 1).T @ (w * beta * initial.twist(initial.pieces, order))
+        else:
+            moment = functions.field(ends, 1).T @ (np.array([-1, 1]) * at_ends["theta"])
+            self.twist = beta * (moment - functions.field(s, 2).T @ (w * fields["theta"]))
         a = np.zeros(self.n, complex)
         if functions.ends:
             a[: functions.ends] = at_ends["x"] + 1j * at_ends["y"]
@@ -201,7 +212,7 @@ class SpectralRod(SkewGradient):
         c = self.basis(z.hi + z.lo)
         rates = self.forward(c, z.pi)
         moved = (rates[..., 0, :] + 1j * rates[..., 1, :]) @ self.line.T
-        slip: Float = np.abs(moved - c.e * rates[..., 2, :]).max(axis=-1)
+        slip: Float = np.abs(moved - c.e * (self._rolls * rates[..., 2, :])).max(axis=-1)
         return slip
 
     def shape(self, hi: Float, lo: Float | None = None) -> Float:

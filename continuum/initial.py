@@ -22,6 +22,9 @@ again. The fields are then smooth on both sides of the edge, and the jumps f(s+)
 * r' = 0 where the line needs a heading.
 
 A corner of theta, omega or phi has finite energy and is accepted.
+
+Parameters of the rod that are functions of s are resolved with the fields, on the same pieces: jumps are refused, corners accepted,
+and narrow features of a parameter are features of the scene.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +33,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from continuum.pieces import ENDS, NODES, POINTS, TINY, WEIGHTS, Cut, Data, split
-from continuum.rod import Scene, SteeredRod
+from continuum.rod import Scene
 from discs.arrays import Float
 from discs.chains.links import CURVATURE
 from discs.chains.rolling import ROLLING
@@ -47,7 +50,7 @@ class Resolved:
     Attributes
     ----------
     scene : the scene.
-    pieces : (P + 1,), edges of the pieces, from 0 to the length. Corners are among them.
+    pieces : (P + 1,), edges of the pieces, from 0 to the length. Corners are among them, those of parameters too.
     energy : kinetic and potential energy by Gauss quadrature, relative error about 1e-12.
     potential : the potential energy.
     features : (place, width) of each feature narrower than length/20. With g = max(|f'|, sqrt(F |f''|/2))/F for a field f of size
@@ -72,6 +75,16 @@ class Resolved:
         x, w = legendre.leggauss(order)
         half = np.diff(self.pieces)[:, None] / 2
         return (self.pieces[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+
+    def twist(self, edges: Float, order: int) -> Float:
+        """theta' at the places of Gauss quadrature with `order` points on pieces, of these or parts of them, (P order,)."""
+        x, w = legendre.leggauss(order)
+        half = np.diff(edges)[:, None] / 2
+        s = (edges[:-1, None] + half * (1 + x)).ravel()
+        expand = (legendre.legvander(x, order - 1) * w[:, None]).T * (np.arange(order) + 0.5)[:, None]
+        theta = self.fields(s)["theta"].reshape(-1, order) @ expand.T
+        found: Float = (theta @ legendre.legder(np.eye(order)).T @ legendre.legvander(x, order - 2).T / half).ravel()
+        return found
 
 
 def resolve(scene: Scene) -> Resolved:
@@ -100,7 +113,8 @@ def _resolve(scene: Scene) -> Resolved:
         parts = _energies(data, cut)
         energies, fewer = parts.sum(axis=0), _energies(data, replace(cut, c=cut.c[..., : 3 * POINTS // 4])).sum(axis=0)
     unsettled = np.abs(energies - fewer) + np.where(cut.width < SHARP * scene.rod.length, energies, 0.0)
-    rounding = 1e-16 * (scene.rod.torsion_stiffness + scene.rod.bending_stiffness) / scene.rod.length
+    rod = scene.rod.at(cut.edges)
+    rounding = 1e-16 * float(np.max(rod.torsion_stiffness + rod.bending_stiffness)) / scene.rod.length
     if not unsettled.sum() <= 1e-3 * energies.sum() + rounding:  # nan too
         place = cut.edges[np.argmax(np.nan_to_num(unsettled, nan=np.inf))]
         raise ValueError(
@@ -114,7 +128,7 @@ def _resolve(scene: Scene) -> Resolved:
 def _seam(data: Data) -> Float:
     """The advance of each field of a closed scene over its length, (F,)."""
     gains = {"x": data.scene.shift[0], "y": data.scene.shift[1], "phi": 2 * np.pi * data.scene.turns}
-    return np.array([gains.get(name, 0.0) for name in data.names])
+    return np.array([gains.get(name, 0.0) for name in data.rows])
 
 
 def _check_jumps(data: Data, cut: Cut) -> None:
@@ -131,7 +145,7 @@ def _check_jumps(data: Data, cut: Cut) -> None:
             row = int(np.argmax(np.abs(gap) / limit))
             gain, end = _seam(data)[row], last[row] + data.chord[row] * data.length
             what = f"the value at s = 0 plus {gain:g}" if gain else "the value at s = 0"
-            by = {"x": " (or another shift)", "y": " (or another shift)", "phi": " (or other turns)"}.get(data.names[row], "")
+            by = {"x": " (or another shift)", "y": " (or another shift)", "phi": " (or other turns)"}.get(data.rows[row], "")
             data.refuse(
                 row,
                 f"must be periodic on a closed scene: at s = length it is {end:.10g}, and {what} is {first[row] + gain:.10g}",
@@ -142,7 +156,7 @@ def _check_jumps(data: Data, cut: Cut) -> None:
         jumps = np.stack([first - given[:, 0], given[:, 1] - last], axis=1)
         _check_jump(data, jumps, limit[:, None], np.array([0.0, data.length]))
     if not scene.steered:
-        if scene.rod.bending_stiffness:
+        if np.any(scene.rod.at(cut.edges).bending_stiffness):
             _check_corners(data, cut)
         if ROLLING[scene.rolling].vanishing or CURVATURE[scene.rod.curvature].directed:
             _check_heading(data, cut)
@@ -155,9 +169,10 @@ def _check_jump(data: Data, jumps: Float, limit: Float, places: Float) -> None:
         return
     row, p = np.unravel_index(int(np.argmax(np.where(beyond, np.abs(jumps) / data.unit[:, None], 0.0))), jumps.shape)
     s, width = places[p], data.length / 100
+    kind = "field" if data.rows[int(row)] in data.scene.unknowns else "parameter"
     data.refuse(
         int(row),
-        f"jumps by {jumps[row, p]:.4g} at s = {s:.10g}: a field of a rod is continuous, and no functions resolve a jump",
+        f"jumps by {jumps[row, p]:.4g} at s = {s:.10g}: a {kind} of a rod is continuous, and no functions resolve a jump",
         f"spread it over a width of {width:g} or more, for example by tanh((s - {s:.6g})/{width:g})",
     )
 
@@ -211,11 +226,11 @@ def _kinks(data: Data, cut: Cut) -> tuple[float, ...]:
 
 def _energies(data: Data, cut: Cut) -> Float:
     """Kinetic and potential energy of every piece, (2, P); see `Rod` for the densities."""
-    scene, rod = data.scene, data.scene.rod
-    value, slope, bend = (dict(zip(data.names, cut.at(NODES, d), strict=True)) for d in range(3))
+    scene, rod = data.scene, data.scene.rod.at(cut.edges[:-1, None] + cut.width[:, None] / 2 * (1 + NODES))
+    value, slope, bend = (dict(zip(data.rows, cut.at(NODES, d), strict=True)) for d in range(3))
     z = slope["x"] + data.chord[0] + 1j * (slope["y"] + data.chord[1])
     z1 = bend["x"] + 1j * bend["y"]
-    if isinstance(rod, SteeredRod):
+    if scene.steered:
         strain = z * np.exp(-1j * value["phi"]) - 1
         kinetic = rod.inertia * value["omega"] ** 2 + rod.heading_inertia * value["phi_rate"] ** 2
         density = rod.stretch_stiffness * strain.real**2 + rod.shear_stiffness * strain.imag**2
@@ -223,14 +238,16 @@ def _energies(data: Data, cut: Cut) -> Float:
     else:
         e = rod.radius * ROLLING[scene.rolling].size(np.abs(z))
         kinetic = (rod.spin_inertia + rod.density * e**2) * value["omega"] ** 2
-        density = CURVATURE[rod.curvature].density(rod.bending_stiffness, rod.stretch_stiffness, z, z1)
+        density = CURVATURE[scene.rod.curvature].density(rod.bending_stiffness, rod.stretch_stiffness, z, z1)
     density += rod.torsion_stiffness * slope["theta"] ** 2
     energies: Float = cut.width / 4 * (np.stack([kinetic, density]) @ WEIGHTS)
     return energies
 
 
 def _features(data: Data, cut: Cut) -> tuple[tuple[float, float], ...]:
-    size = np.abs(cut.at(NODES) - data.known.mean(axis=1)[:, None, None]).max(axis=(1, 2))
+    fields = len(data.scene.unknowns)
+    about = np.append(data.known.mean(axis=1)[:fields], np.zeros(len(data.rows) - fields))  # all of a parameter is its size
+    size = np.abs(cut.at(NODES) - about[:, None, None]).max(axis=(1, 2))
     size = np.where(size > 1e3 * data.rounding, size, np.inf)[:, None, None]
     first, second = cut.at(NODES, 1), cut.at(NODES, 2)
     rate = np.maximum(np.abs(first) / size, np.sqrt(np.abs(second) / size / 2)).max(axis=0).ravel()

@@ -109,7 +109,7 @@ def _(load: Force, to: Terms) -> None:
 @add.register
 def _(load: Slope, to: Terms) -> None:
     for row, g in ((X, load.gx), (Y, load.gy)):
-        to.push[row] += to.scene.rod.density * checks.number("g of Slope", g) * to.w
+        to.push[row] += to.scene.rod.at(to.s).density * checks.number("g of Slope", g) * to.w
 
 
 @add.register
@@ -134,7 +134,7 @@ def _(load: Damping, to: Terms) -> None:
 @add.register
 def _(load: Rest, to: Terms) -> None:
     _refuse_headings(load, "curvature", "stretch", "shear", "mounting_angle")
-    root = np.sqrt(to.scene.rod.torsion_stiffness * to.w)
+    root = np.sqrt(to.scene.rod.at(to.s).torsion_stiffness * to.w)
     strain = root * to.at(load, "twist")
     if load.signal is None:
         to.push[TWIST] += root * strain

@@ -1,14 +1,18 @@
 """The rod on a mesh: second-order finite differences in s, which are the equations of rolling discs."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from continuum.initial import resolve
+from continuum.parameters import sample
 from continuum.pieces import POINTS
-from continuum.rod import Scene, SteeredRod
+from continuum.rod import PARAMETERS, Scene, SteeredRod
 from discs import Chain, Problem, State, SteeredChain, checks
+from discs.arrays import Float
 from discs.chains import stencils
+from discs.files.schema import ROD
 
 UNSEEN = 1 / 4  # of an energy: discs that miss more than this do not resolve the initial fields
 
@@ -30,21 +34,42 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     checks.choice("ends", ends, stencils.ENDS)
     if ends == "ring" and not scene.closed:
         raise ValueError("ends='ring' needs a closed scene; this one has two free ends: take 'springs' or 'consistent'")
-    rod = scene.rod
-    names = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness", "radius")
-    common: dict[str, float] = {name: getattr(rod, name) for name in names}
-    ends = "ring" if scene.closed else ends
+    rod, ends = scene.rod, "ring" if scene.closed else ends
+    names = [name for name in PARAMETERS if hasattr(rod, name)]
+    # a varying parameter stands in by 1 until the chain knows its places
+    common = {name: 1.0 if name in rod.varying else getattr(rod, name) for name in names} | {"length": rod.length}
     chain: Chain | SteeredChain
     if isinstance(rod, SteeredRod):
-        common |= {"shear_stiffness": rod.shear_stiffness, "heading_inertia": rod.heading_inertia}
         chain = SteeredChain(n=n, ends=ends, shift=scene.shift, turns=scene.turns, **common)
     else:
         chain = Chain(n=n, ends=ends, shift=scene.shift, rolling=scene.rolling, curvature=rod.curvature, **common)
+    if rod.varying:
+        at = places(chain)
+        sampled: dict[str, Any] = {name: sample(name, function, at[name]) for name, function in rod.varying.items()}
+        chain = replace(chain, **sampled)
     return Problem(chain, State(**scene.fields(chain.s)), scene.duration, scene.loads)
 
 
+def places(chain: Chain | SteeredChain) -> dict[str, Float]:
+    """Where a rod's parameters are taken for a chain, by name.
+
+    Every sum of the discs is then a quadrature of order 2 of an integral of the field, by the trapezoidal rule (at discs and bends,
+    with half shares at free ends) or by midpoints (of links), and its terms, differences about these places, are of order 2 too:
+
+        int (alpha + rho |e|^2) omega psi   ->  sum over discs, rho, alpha and R (of e) at the discs,
+        int beta theta' psi'                ->  sum over links, beta at their middles, and so K phi' chi', A, G of own headings,
+        int K r'' . (e psi)''               ->  sum over bends, K at their discs; consistent ends have bends with K(0), K(length).
+
+    Smooth functions multiply the terms, so this holds as for a uniform rod. The end conditions of the field need nothing more: they
+    are natural, and a consistent end has the trapezoidal sum, ghost disc included, of the integral that they follow from. Averages
+    over shares would change the parameters by O(k^2), and no order.
+    """
+    rows = {"disc": chain.s, "link": chain.middles, "bend": chain.bends if isinstance(chain, Chain) else chain.middles}
+    return {name: np.minimum(rows[ROD[name].dims[0]], chain.length) for name in PARAMETERS}  # places are rounded
+
+
 def unseen(scene: Scene, problem: Problem) -> str:
-    """The warning if the discs are too few to resolve the initial fields of a scene; otherwise empty.
+    """The warning if the discs are too few to resolve the initial fields of a scene, or its parameters; otherwise empty.
 
     Consider the fields that are linear between the discs. For theta their energy is that of the springs. They are the projection in
     energy, so that
@@ -55,7 +80,7 @@ def unseen(scene: Scene, problem: Problem) -> str:
     way. For omega (and the rate of phi) the missing part is M/2 int (omega - linear interpolation)^2, compared with
     M/2 int (omega - mean)^2. A quarter of either, which is half of a field by its root mean square, gives a warning. Parts below a
     millionth of the whole energy are ignored. The paper's twist misses 1.3 % at n = 9; a bump exp(-(s/w)^2) misses a quarter at k =
-    w.
+    w. A parameter p of the rod that varies is compared as omega is, int (p - linear interpolation)^2 with int (p - mean)^2.
     """
     try:
         found = resolve(scene)
@@ -66,14 +91,25 @@ def unseen(scene: Scene, problem: Problem) -> str:
     parts = {"potential energy": (abs(found.potential - problem.energy() + 0.5 * float(np.vdot(pi, pi))), found.potential)}
     s, w = found.quadrature(POINTS)
     fields = found.fields(s)
-    inertia = {"omega": scene.rod.inertia} | ({"phi_rate": scene.rod.heading_inertia} if isinstance(scene.rod, SteeredRod) else {})
-    for name, moment in inertia.items():
-        value, period = fields[name], scene.rod.length if scene.closed else None
-        between = np.interp(s, problem.chain.s, np.asarray(getattr(problem.initial, name)), period=period)
+    rod, chain, period = scene.rod.at(s), problem.chain, scene.rod.length if scene.closed else None
+
+    def missing(value: Float, places: Float, known: Float, weights: Float) -> tuple[float, float]:
+        """Integrals over squares: of a field less what is linear between its values at some places, and less its mean."""
         about = value - (w @ value) / scene.rod.length
-        lost, whole = (float(0.5 * moment * w @ part**2) for part in (value - between, about))
-        parts[f"kinetic energy of {name}"] = lost, whole
-    missed = [name for name, (lost, whole) in parts.items() if lost > UNSEEN * whole and whole > 1e-6 * found.energy]
+        lost, whole = (float(weights @ part**2) for part in (value - np.interp(s, places, known, period=period), about))
+        return lost, whole
+
+    inertia = {"omega": rod.inertia} | ({"phi_rate": rod.heading_inertia} if scene.steered else {})
+    for name, moment in inertia.items():
+        known = np.asarray(getattr(problem.initial, name))
+        parts[f"kinetic energy of {name}"] = missing(fields[name], chain.s, known, 0.5 * moment * w)
+    least = dict.fromkeys(parts, 1e-6 * found.energy)
+    for name, at in places(chain).items():
+        if name in scene.rod.varying:
+            value = getattr(rod, name)
+            parts[name] = missing(value, at, np.asarray(getattr(chain, name)), w)
+            least[name] = 1e-6 * float(w @ value**2)
+    missed = [name for name, (lost, whole) in parts.items() if lost > UNSEEN * whole and whole > least[name]]
     if not missed:
         return ""
     lost, whole = parts[missed[0]]
@@ -83,7 +119,8 @@ def unseen(scene: Scene, problem: Problem) -> str:
         place, width = min(found.features, key=lambda feature: feature[1])
         where = f", which vary within {width:.2g} at s = {place:.4g}"
         enough = max(enough, int(np.ceil(2 * scene.rod.length / width)))
+    what = f"{missed[0]} of the rod" if missed[0] in scene.rod.varying else "initial fields"
     return (
-        f"{problem.chain.n} discs are too few for the initial fields{where}: they miss {lost:.3g} of {whole:.3g}, the {missed[0]}; "
+        f"{problem.chain.n} discs are too few for the {what}{where}: they miss {lost:.3g} of {whole:.3g}, the {missed[0]}; "
         f"take n = {enough} or more"
     )

@@ -1,4 +1,4 @@
-"""Piecewise Legendre polynomials of the initial fields, by bisection; see `continuum.initial`."""
+"""Piecewise Legendre polynomials of the initial fields and of parameters that vary, by bisection; see `continuum.initial`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
+from continuum.parameters import sample
 from continuum.rod import Scene
 from discs.arrays import Bool, Float, Int
 
@@ -40,8 +41,6 @@ class Sampled:
     letter : of the variable, for messages.
     """
 
-    title = ""
-
     def __init__(
         self, read: Callable[[Float], ArrayLike], length: float, names: tuple[str, ...], unit: ArrayLike = 0.0, letter: str = "s"
     ) -> None:
@@ -67,24 +66,31 @@ class Sampled:
         """Raise ValueError about a function. The message says so if its values depend on the other places asked for."""
         apart = np.abs(self.read(self.probes[::2]) - self.known[:, ::2]).max(axis=1)
         if (apart > 1e3 * self.allowed).any():
-            name = self.title + self.names[int(np.argmax(apart))]
+            name = self.names[int(np.argmax(apart))]
             raise ValueError(
                 f"{name} must be a function of the {PLACE[self.letter]}: its values change with what other "
                 f"{PLACE[self.letter]}s are asked for; tabulate it once and interpolate"
             )
-        raise ValueError(f"{self.title}{self.names[row]} {what}; {cure}")
+        raise ValueError(f"{self.names[row]} {what}; {cure}")
 
 
 class Data(Sampled):
-    """The initial fields of a scene, x and y less their chord."""
+    """The initial fields of a scene, x and y less their chord, and the parameters of its rod that vary.
 
-    title = "initial "
+    rows : their names in code.
+    """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, length = scene, scene.rod.length
+        self.scene, length, varying = scene, scene.rod.length, scene.rod.varying
+        self.rows = (*scene.unknowns, *varying)
         units = {"x": length, "y": length, "omega": 1 / scene.duration, "phi_rate": 1 / scene.duration}
-        unit = [units.get(name, 1.0) for name in scene.unknowns]
-        super().__init__(lambda s: list(scene.fields(s).values()), length, scene.unknowns, unit)
+        unit = [units.get(name, 1.0) for name in scene.unknowns] + [1.0 for _ in varying]
+        names = (*(f"initial {name}" for name in scene.unknowns), *varying)
+
+        def read(s: Float) -> list[Float]:
+            return [*scene.fields(s).values(), *(sample(name, function, s) for name, function in varying.items())]
+
+        super().__init__(read, length, names, unit)
 
     def _chords(self, raw: Float) -> Float:
         chord = np.zeros(len(raw))

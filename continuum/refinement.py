@@ -34,7 +34,8 @@ class Found(NamedTuple):
 def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
     """The fields within bounds by name; the error is measured with more elements.
 
-    1. Start with the fewest elements that resolve the initial fields: bounded fields within their bounds, other fields to a tenth.
+    1. Start with the fewest elements that resolve the initial fields: bounded fields within their bounds, other fields, and
+       parameters that vary, to a tenth.
     2. Compute the motion with the next number of elements in COUNTS, and the change from the last motion.
     3. If errors fall like count^-p, the error of the coarser of two counts c < C, which is the result, is
 
@@ -53,8 +54,9 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progr
     first = next((i for i, count in enumerate(COUNTS) if _holds(Elements(scene, count), bound)), len(COUNTS))
     counts = COUNTS[first:]
     if len(counts) < 3:
+        what = "initial fields and the rod's parameters" if scene.rod.varying else "initial fields"
         raise ValueError(
-            f"tol is not reached on {COUNTS[-1]} elements, as these do not resolve the initial fields: {_sharpest(scene)}; "
+            f"tol is not reached on {COUNTS[-1]} elements, as these do not resolve the {what}: {_sharpest(scene)}; "
             f"take fields varying over length/{COUNTS[-1] // 4} = {4 * scene.rod.length / COUNTS[-1]:.2g} or more, or a larger tol"
         )
     runs: list[Found] = []
@@ -113,7 +115,8 @@ def _hopeless(scene: Scene, times: float, count: int) -> bool:
 def _corners(scene: Scene) -> str:
     """A hint for messages about initial fields that have corners; empty for others."""
     kinks = resolve(scene).kinks
-    return f": the initial fields have a corner at s = {kinks[0]:.4g}, which the motion keeps; round it" if kinks else ""
+    what = "initial fields or the rod's parameters" if scene.rod.varying else "initial fields"
+    return f": the {what} have a corner at s = {kinks[0]:.4g}, which the motion keeps; round it" if kinks else ""
 
 
 def _sharpest(scene: Scene) -> str:
@@ -126,10 +129,13 @@ def _sharpest(scene: Scene) -> str:
 
 
 def _holds(system: Elements, bound: Mapping[str, float]) -> bool:
-    """Whether the elements resolve the initial fields: bounded fields within their bounds, other fields to a tenth."""
+    """Whether the elements resolve the initial fields: bounded fields within their bounds, others, and parameters, to a tenth."""
     scene = system.scene
     unit = {"x": scene.rod.length, "y": scene.rod.length, "omega": 1 / scene.duration, "phi_rate": 1 / scene.duration}
-    for name, misfit in system.misfit.items():
+    if any(system.misfit[name] > 1 / 10 for name in scene.rod.varying):
+        return False
+    for name in UNKNOWNS:
+        misfit = system.misfit[name]
         size = float(np.ptp(system.start[UNKNOWNS.index(name)])) / 2
         rounding = LEAST * unit.get(name, 1.0)
         small = max(size / 10, min(bound.values()) / scene.duration) if name in RATES else size / 10

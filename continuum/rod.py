@@ -1,11 +1,12 @@
 """The rod: its parameters, and a scene, which adds the initial fields."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 
 import numpy as np
 
+from continuum.parameters import CHECKED, POSITIVE, Function, Parameter, Section, sample
 from discs import checks
 from discs.arrays import Float
 from discs.chains import links
@@ -13,6 +14,8 @@ from discs.chains.rolling import ROLLING
 from discs.loads import OnRod
 
 Fields = Callable[[Float], tuple[Float, ...]]
+PARAMETERS = tuple(f.name for f in dataclass_fields(Section))
+TOLD = 33  # values of a function of s in `Scene.description`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +23,13 @@ class Rod:
     """A nonholonomic Cosserat rod (section 3 of the paper), in any consistent unit system.
 
     Kinetic energy per length rho |r.|**2/2 + alpha omega**2/2, potential beta theta'**2/2 + K |r''|**2/2.
+
+    A parameter that is not the same everywhere is a function of s: it takes places (m,) and returns (m,) numbers, or one.
+    `continuum.parameters` has some by name, which scene files can hold. The equations have them inside the derivatives,
+
+        rho r.. = -(K r'')'' + lambda,   alpha theta.. = (beta theta')' - e . lambda,   e = R J r' or R J r'/|r'|.
+
+    At a free end there is no curvature, beta theta' = e . (K r'')' = K e . r''' and |r'| stays 1, as for a uniform rod.
 
     Parameters
     ----------
@@ -35,32 +45,53 @@ class Rod:
 
     Raises
     ------
-    ValueError : for a parameter outside its range.
+    ValueError : for a parameter outside its range. A function of s is read at 1025 places, and checked wherever it is read later.
     """
 
     length: float
-    density: float
-    spin_inertia: float
-    torsion_stiffness: float
-    bending_stiffness: float
-    radius: float
+    density: Parameter
+    spin_inertia: Parameter
+    torsion_stiffness: Parameter
+    bending_stiffness: Parameter
+    radius: Parameter
     curvature: str = "linear"
-    stretch_stiffness: float = 0.0
+    stretch_stiffness: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        _settle(self, ("length", "density"), positive=True)
-        _settle(self, ("radius", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness"))
-        if not self.inertia:
+        _settle(
+            self, ("length", "density", "radius", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness")
+        )
+        if not self.varying and not self.inertia:
             raise ValueError("spin_inertia must be positive where radius = 0; got 0 for both")
+        if self.varying:
+            s = np.linspace(0.0, self.length, CHECKED)
+            inertia = np.broadcast_to(self.at(s).inertia, s.shape)
+            if not inertia.all():
+                raise ValueError(f"spin_inertia must be positive where radius = 0; got 0 for both at s = {s[np.argmin(inertia)]:g}")
         self._check_law()
 
     def _check_law(self) -> None:
-        links.find(self.curvature, self.stretch_stiffness)
+        links.find(self.curvature, callable(self.stretch_stiffness) or self.stretch_stiffness)
+
+    @property
+    def varying(self) -> dict[str, Function]:
+        """The parameters that are functions of s, by name."""
+        return {name: value for name in PARAMETERS if callable(value := getattr(self, name, 0.0))}
+
+    def at(self, s: Float) -> Section[Float]:
+        """The parameters at places s along the rod, of any shape."""
+        return Section(**{name: sample(name, getattr(self, name, 0.0), s) for name in PARAMETERS})
+
+    def uniform(self, what: str) -> Section[float]:
+        """The parameters as numbers. ValueError if some are functions of s, as `what` is for uniform rods."""
+        if self.varying:
+            raise ValueError(f"{what}: for rods whose parameters are numbers; along this one vary {', '.join(self.varying)}")
+        return Section(**{name: getattr(self, name, 0.0) for name in PARAMETERS})
 
     @property
     def inertia(self) -> float:
-        """M = alpha + rho R**2, the inertia of rolling per length while |r'| = 1."""
-        return self.spin_inertia + self.density * (self.radius * self.radius)  # a power would raise where this is inf
+        """M = alpha + rho R**2 of a uniform rod, the inertia of rolling per length while |r'| = 1; of others, `at(s).inertia`."""
+        return self.uniform("inertia").inertia
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,23 +106,25 @@ class SteeredRod(Rod):
     stretch_stiffness, shear_stiffness : A, G >= 0, force per stretch and per shear angle.
     """
 
-    shear_stiffness: float
-    heading_inertia: float
+    shear_stiffness: Parameter
+    heading_inertia: Parameter
     curvature: str = "true"
 
     def __post_init__(self) -> None:
+        _settle(self, ("length", "shear_stiffness", "heading_inertia"))
         super().__post_init__()
-        _settle(self, ("shear_stiffness",))
-        _settle(self, ("heading_inertia",), positive=True)
 
     def _check_law(self) -> None:
         checks.choice("curvature (own headings)", self.curvature, ("true",))
 
 
-def _settle(rod: Rod, names: tuple[str, ...], positive: bool = False) -> None:
-    """Check parameters and store them as floats."""
+def _settle(rod: Rod, names: tuple[str, ...]) -> None:
+    """Check parameters that are numbers and store them as floats; functions of s are checked when they are read."""
     for name in names:
-        value = checks.number(name, getattr(rod, name), positive=positive)
+        given = getattr(rod, name)
+        if name != "length" and callable(given):
+            continue
+        value = checks.number(name, given, positive=name in ("length", *POSITIVE))
         if value < 0:
             raise ValueError(f"{name} must be at least 0; got {checks.shown(value)}")
         object.__setattr__(rod, name, value)
@@ -175,10 +208,16 @@ class Scene:
         return {name: checks.field(f"initial {name}", value, s.size) for name, value in zip(names, values, strict=True)}
 
     def description(self) -> dict[str, object]:
-        """The scene without its initial fields, as numbers and words: `Solution.stats["scene"]`."""
+        """The scene without its initial fields, as numbers and words: `Solution.stats["scene"]`.
+
+        A function of s is stored as its values at 33 equally spaced places, the ends included.
+        """
         names = ("name", "rolling", "duration", "closed", "shift", "turns")
         loads = {"loads": [checks.shown(load) for load in self.loads]} if self.loads else {}
-        return {name: getattr(self, name) for name in names} | asdict(self.rod) | loads
+        rod, places = self.rod, np.linspace(0.0, self.rod.length, TOLD)
+        numbers = {f.name: getattr(rod, f.name) for f in dataclass_fields(rod)}
+        sampled = {name: sample(name, function, places).tolist() for name, function in rod.varying.items()}
+        return {name: getattr(self, name) for name in names} | numbers | sampled | loads
 
     @property
     def unknowns(self) -> tuple[str, ...]:

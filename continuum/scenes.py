@@ -1,30 +1,43 @@
 """Named scenes. Parameters of the rod that are not given have the paper's values."""
 
 from functools import partial
-from typing import Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
+from continuum.parameters import Parameter
 from continuum.rod import Rod, Scene, SteeredRod
 from discs import checks
 from discs.arrays import Float
-from discs.chains.twist import PAPER, Parameters, twisted
+from discs.chains.twist import PAPER, twisted
 from discs.loads import Rest
 
 LAW = ("curvature", "stretch_stiffness")
+
+
+class Parameters(TypedDict, total=False):
+    """Parameters that every rod has, any of them: numbers or functions of s."""
+
+    length: float
+    density: Parameter
+    spin_inertia: Parameter
+    torsion_stiffness: Parameter
+    bending_stiffness: Parameter
+    radius: Parameter
 
 
 class RodParameters(Parameters, total=False):
     """Parameters of a `Rod`, any of them."""
 
     curvature: str
-    stretch_stiffness: float
+    stretch_stiffness: Parameter
 
 
 def _rod(given: RodParameters) -> Rod:
     for name in given:
         checks.choice("rod parameter", name, (*PAPER, *LAW))
-    return Rod(**(PAPER | given))
+    parameters: dict[str, Any] = {**PAPER, **given}
+    return Rod(**parameters)
 
 
 def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: Unpack[RodParameters]) -> Scene:
@@ -40,9 +53,9 @@ def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float =
 
 
 def steered_rod(
-    stretch_stiffness: float = 10.0,
-    shear_stiffness: float = 10.0,
-    heading_inertia: float = 0.25,
+    stretch_stiffness: Parameter = 10.0,
+    shear_stiffness: Parameter = 10.0,
+    heading_inertia: Parameter = 0.25,
     duration: float = 4.5,
     twist: float = 0.5,
     mounting_angle: float = 0.0,
@@ -54,8 +67,9 @@ def steered_rod(
     """
     for name in parameters:
         checks.choice("rod parameter", name, PAPER)
+    given: dict[str, Any] = {**PAPER, **parameters}
     rod = SteeredRod(
-        **(PAPER | parameters),
+        **given,
         stretch_stiffness=stretch_stiffness,
         shear_stiffness=shear_stiffness,
         heading_inertia=heading_inertia,
@@ -81,9 +95,7 @@ def rolling_rod(
     """
     rod = _rod(parameters)
     q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
-    initial = partial(
-        _rolling, q=q, radius=rod.radius, omega=checks.number("omega", omega), amplitude=checks.number("amplitude", amplitude)
-    )
+    initial = partial(_rolling, q=q, rod=rod, omega=checks.number("omega", omega), amplitude=checks.number("amplitude", amplitude))
     return Scene(
         rod=rod,
         initial=initial,
@@ -106,9 +118,9 @@ def _steered(s: Float, length: float, amplitude: float, phi: float) -> tuple[Flo
     return (*twisted(s, length, amplitude), np.full_like(s, phi), 0 * s)
 
 
-def _rolling(s: Float, q: float, radius: float, omega: float, amplitude: float) -> tuple[Float, Float, Float, Float]:
+def _rolling(s: Float, q: float, rod: Rod, omega: float, amplitude: float) -> tuple[Float, Float, Float, Float]:
     theta = amplitude * np.cos(q * s)
-    return s, radius * theta, theta, np.full_like(s, omega)
+    return s, rod.at(s).radius * theta, theta, np.full_like(s, omega)
 
 
 def _circle(s: Float, radius: float, omega: float) -> tuple[Float, Float, Float, Float]:

@@ -23,8 +23,10 @@ from tqdm import tqdm
 
 from continuum.bounds import FIELDS, missed, over
 from continuum.density import Density
+from continuum.functions import unresolved
 from continuum.galerkin import SpectralRod
 from continuum.initial import resolve
+from continuum.pieces import POINTS
 from continuum.rod import Scene
 from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
 from discs import SimulationError, Solution
@@ -70,7 +72,7 @@ class Motion(NamedTuple):
 
     rod, states : the system, and its states at the times, in groups.
     fields : (F, S) by name.
-    start : largest error of the fields at the start, by name.
+    start : largest error of the fields at the start, by name, and what parameters that are not resolved may add to it.
     tolerance : of a step. steps : number of steps.
     balance : (F, 2), work and dissipation; None without loads.
     """
@@ -120,7 +122,10 @@ class Runner:
         fields = at(every)
         if steps.lengths:
             self._first = steps.lengths[0]
-        start = {name: float(np.abs(begun[name] - initial[name]).max()) for name in FIELDS}
+        start = distances(begun, initial)
+        missed = unresolved(rod.functions, self._scene.rod, *resolve(self._scene).quadrature(POINTS))
+        if missed:
+            start = {name: start[name] + missed * moved for name, moved in distances(fields, begun).items()}
         balance = None
         if rod.loads:  # what signals change of the energy is work, too
             balance = np.concatenate(steps.balance)
@@ -157,6 +162,17 @@ def point_hint(scene: Scene) -> str:
     if not inside:
         return ""
     return f"; the load at the point s = {inside[0]:g} makes a corner there, which functions resolve slowly: spread it over a width"
+
+
+def corner_hint(scene: Scene) -> str:
+    """A hint for scenes whose rod may have a corner in its parameters; empty for others."""
+    kinks = resolve(scene).kinks if scene.rod.varying else ()
+    if not kinks:
+        return ""
+    return (
+        f"; the scene, its rod included, has a corner at s = {kinks[0]:.6g}, which functions resolve slowly: round it, or take "
+        "method='richardson'"
+    )
 
 
 class Search:
@@ -251,7 +267,7 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progr
         except TooFast as error:
             raise SimulationError(error.message + bent_hint(scene), error.step, error.time, error.disc) from None
         except ValueError as error:
-            raise ValueError(f"{error}{bent_hint(scene)}{point_hint(scene)}") from None
+            raise ValueError(f"{error}{bent_hint(scene)}{point_hint(scene)}{corner_hint(scene)}") from None
     rounded = {"x": scene.rod.length, "y": scene.rod.length}
     estimate = {name: error + sweeps(found.tolerance) * rounded.get(name, 1.0) for name, error in search.estimate.items()}
     stats: Stats = {

@@ -133,7 +133,9 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
 
     n, none = theta.shape[1], np.zeros((0, 0))
     strains = np.array([0 * s + drive.strain for drive in terms.drives]).reshape(-1, s.size)
-    twisted = _slope(initial, edges, order, s.size) if strains.any() or terms.strain.any() else 0 * s
+    twisted = np.zeros(s.size)  # theta' of the initial fields, where it is needed
+    if strains.any() or terms.strain.any():
+        twisted[: s.size - len(points)] = initial.twist(edges, order)
     start = initial.fields(s)
     line_energy = (
         0.5 * terms.stiffness @ (start["x"] ** 2 + start["y"] ** 2) - terms.push[X] @ start["x"] - terms.push[Y] @ start["y"]
@@ -151,15 +153,3 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
         energy=terms.offset + float(line_energy + 0.5 * terms.strain @ terms.strain - terms.push[TWIST] @ twisted),
         timing=Timing(scene),
     )
-
-
-def _slope(initial: Resolved, edges: Float, order: int, size: int) -> Float:
-    """theta' of the initial fields at the Gauss points of the pieces, (size,), and zeros after them."""
-    x, w = legendre.leggauss(order)
-    half = np.diff(edges)[:, None] / 2
-    s = (edges[:-1, None] + half * (1 + x)).ravel()
-    expand = (legendre.legvander(x, order - 1) * w[:, None]).T * (np.arange(order) + 0.5)[:, None]
-    theta = initial.fields(s)["theta"].reshape(-1, order) @ expand.T
-    found = np.zeros(size)
-    found[: s.size] = (theta @ legendre.legder(np.eye(order)).T @ legendre.legvander(x, order - 2).T / half).ravel()
-    return found

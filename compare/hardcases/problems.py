@@ -109,11 +109,11 @@ def rolling_waves(
     neither by each other nor by rounding.
     """
     scene = rolling_rod(rolling=rolling, duration=duration, bending_stiffness=stiffness, radius=0.7, density=1.3, spin_inertia=0.6)
-    problem, rod = lump(scene, n), scene.rod
+    problem, rod, radius = lump(scene, n), scene.rod, scene.rod.uniform("waves").radius
     k, modes = problem.chain.k, np.arange(1, (n + 1) // 2)
     q = np.asarray(2 * np.pi * modes / rod.length, dtype=float)
-    push = rod.radius * symbols(q, k)[1] / growth(rod, q, 1.0, "field", k) if rolling == "field" else 0 * q
-    vartheta = (1 - push**2) / rod.radius
+    push = radius * symbols(q, k)[1] / growth(rod, q, 1.0, "field", k) if rolling == "field" else 0 * q
+    vartheta = (1 - push**2) / radius
     rate = growth(rod, q, 1.0, rolling, k)
     parts = np.array([-1j * push, np.ones_like(q), vartheta, rate * vartheta])
     parts *= 1e-9 / np.abs(parts).max(axis=0) * np.exp(2j * np.pi * np.random.default_rng(2).random(q.size))
@@ -124,8 +124,8 @@ def rolling_waves(
     found, run = march(problem, method, None if method in EXPLICIT else multiple * k, seconds)
     if run is None:
         return found, None
-    turn = 2**0.5 * rod.radius / frequency(rod, q, k)
-    rows = (run.x - problem.chain.s, run.y, rod.radius * run.theta)
+    turn = 2**0.5 * radius / frequency(rod, q, k)
+    rows = (run.x - problem.chain.s, run.y, radius * run.theta)
     parts = np.array([np.fft.rfft(row, axis=1)[:, modes] for row in (*rows, run.omega)])
     parts[3] *= turn
     size = np.linalg.norm(parts, axis=0)

@@ -133,6 +133,12 @@ class Chain(Spaced):
         return stencils.bend_shares(self.n, self.k, self._bend_ends)
 
     @property
+    def bends(self) -> Float:
+        """Places of the bends along the rod, (n_bends,): those of their discs."""
+        s, missing = self.s, self.n - self.bend_shares.size
+        return s[missing // 2 : self.n - missing // 2]
+
+    @property
     def _bend_ends(self) -> str:
         return "springs" if self.ends == "consistent" and not self.link_law.end_bends else self.ends
 

@@ -30,8 +30,10 @@ class LinkLaw(Protocol):
     def __init__(self, chain: "Chain") -> None: ...
 
     @staticmethod
-    def density(bending: float, stretching: float, z: Complex, z1: Complex) -> Float:
-        """Twice the energy of bending and stretch per length, for r' = z and r'' = z1, complex numbers x + i y of any shape."""
+    def density(bending: Float, stretching: Float, z: Complex, z1: Complex) -> Float:
+        """Twice the energy of bending and stretch per length, for r' = z and r'' = z1, complex numbers x + i y of any shape.
+
+        The stiffnesses have this shape, or no dimensions."""
 
     @property
     def parameters(self) -> Parameters:

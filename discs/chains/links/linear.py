@@ -31,8 +31,9 @@ class LinearCurvature(LinkLaw):
     quadratic, end_bends, stretches, directed = True, True, False, False
 
     @staticmethod
-    def density(bending: float, stretching: float, z: Complex, z1: Complex) -> Float:
-        return bending * np.abs(z1) ** 2
+    def density(bending: Float, stretching: Float, z: Complex, z1: Complex) -> Float:
+        density: Float = bending * np.abs(z1) ** 2
+        return density
 
     def __init__(self, chain: "Chain") -> None:
         self._n, self._ends = chain.n, chain.ends

@@ -40,8 +40,8 @@ class TrueCurvature(LinkLaw):
     parameters = None
 
     @staticmethod
-    def density(bending: float, stretching: float, z: Complex, z1: Complex) -> Float:
-        turning = (z.conj() * z1).imag / np.abs(z) ** 2 if bending else 0.0
+    def density(bending: Float, stretching: Float, z: Complex, z1: Complex) -> Float:
+        turning = (z.conj() * z1).imag / np.abs(z) ** 2 if np.any(bending) else 0.0
         density: Float = bending * turning**2 + stretching * (np.abs(z) - 1) ** 2
         return density
 
