@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 from discs.mechanics import MechanicalSystem, driven, textbook
 from discs.mechanics.momentum import symmetry_momenta
 
+pytestmark = pytest.mark.slow  # each motion is integrated to 1e-10, and again by another method
+
 BALL = {"mass": 1.3, "radius": 0.7, "table_rate": 1.7, "place": (0.4, -0.3), "velocity": (0.2, 0.5), "spin": 0.6}
 HOMOGENEOUS = 0.4 * 1.3 * 0.7**2
 BOOKS = {

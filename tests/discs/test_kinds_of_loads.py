@@ -14,6 +14,8 @@ from discs.loads import Custom, Damping, Force, Motor, Rest, Slope, Spring, Torq
 from tests.conftest import models, uneven
 from tests.discs.test_loads import KINDS, by_discs, by_multipliers
 
+pytestmark = pytest.mark.slow  # every load with every chain
+
 CLOSE = {"midpoint": 2e-3, "suzuki4": 2e-5, "kahanli6": 1e-6, "gauss6": 1e-6, "rk4": 1e-5, "DOP853": 1e-6}
 
 

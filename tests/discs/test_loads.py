@@ -50,6 +50,7 @@ def by_discs(problem: Problem, name: str, engine: str):
     return [getattr(run, row)[-1] for row in problem.system.rows], run.contact_force[-1]
 
 
+@pytest.mark.slow
 @models(KINDS)
 def test_loads_move_discs_as_the_saddle_point_says(model, kernels_as_python):
     problem = loaded(model)

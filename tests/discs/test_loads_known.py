@@ -160,6 +160,7 @@ def along_y(stiffness: float, problem: Problem):
     return Linear(stiffness=np.outer([0, stiffness, 0], problem.chain.w))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["compiled", "plain"])
 def test_the_balance_stays_exact_over_many_steps(engine, kernels_as_python):
     problem = uneven(4, Model("consistent", "field"))

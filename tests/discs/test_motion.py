@@ -136,6 +136,7 @@ def rescaled(system, q, v, coordinates, time, mass):
 BOOKS = {**CLOSED, "contact": contact(), "driven": driven(0.6)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [-6, 6])
 @pytest.mark.parametrize("name", BOOKS)
 def test_units_of_length_mass_and_time_do_not_matter(name, power):

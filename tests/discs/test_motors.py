@@ -12,6 +12,8 @@ from discs.mechanics.lagrange import lagrange_dalembert
 from tests.conftest import models, uneven
 from tests.discs.test_loads import KINDS
 
+pytestmark = pytest.mark.slow  # every chain with its saddle point
+
 RATE = 1.3
 
 

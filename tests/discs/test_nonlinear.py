@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 from discs.mechanics import MechanicalSystem, textbook
 from discs.mechanics.momentum import nonholonomic_momenta
 
+pytestmark = pytest.mark.slow  # each motion is integrated to 1e-10, and again by another method
+
 TIMES = np.linspace(0, 2, 9)
 
 

@@ -13,6 +13,8 @@ from discs.mechanics import Trajectory, driven, textbook
 from discs.mechanics.lagrange import frames, lagrange_dalembert
 from tests.conftest import SLAVED, STEERED, uneven
 
+pytestmark = pytest.mark.slow  # every kind of system, saved, drawn and loaded
+
 TIMES = np.linspace(0, 1, 5)
 
 

@@ -14,6 +14,8 @@ from discs.pictures import figures
 from tests.conftest import Model, models, uneven
 from tests.discs.test_system import contact_from_the_definition, potential_from_the_definition
 
+pytestmark = pytest.mark.slow  # each motion is a boundary-value problem or many of them
+
 M, SPIN, TURN, R = 1.3, 0.4, 0.25, 0.7
 PULL, SPRING = np.array([0.9, -0.4]), 0.5
 INERTIA = SPIN + M * R**2
