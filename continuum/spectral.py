@@ -35,6 +35,7 @@ from discs.running.stats import Stats
 from discs.skew import Phase
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
+MORE = (505, 707, 1001)  # these are slow, and taken only if the errors fall fast enough
 NODES = 1025  # nodes of a solution, enough for splines and their derivatives; more if the initial fields are narrow
 MOST_NODES = 8192
 LOOSEST = 2e-4  # largest tolerance of a step
@@ -196,12 +197,13 @@ class Search:
         self.runner = Runner(scene, times, NARROW_STAGES if narrow else stages_for(tol))
         self.estimate = dict.fromkeys(FIELDS, np.inf)
         self._change = np.inf  # of the last two motions, over its bound
+        self._ratio = np.inf  # of the last two changes
 
     def result(self) -> Motion:
         """A motion within the bounds."""
         tol = min(self._bound.values())
         start = sum(tol < below for below in self._plan.more)
-        sizes = SIZES[min(start, len(SIZES) - 2) :]
+        sizes = (SIZES + MORE)[min(start, len(SIZES) - 2) :]
         tolerance = min(self._plan.first * tol, LOOSEST)
         stages = self.runner.stages
         finest = tolerance
@@ -209,6 +211,9 @@ class Search:
             finest = finer(finest, stages)
         last, failure = None, None
         for n, fewer in zip(sizes, (sizes[0], *sizes), strict=False):
+            # changes fall ever faster once a motion is resolved: at most as if by the square of the last ratio
+            if n in MORE and self._change * self._ratio ** (2 * len(sizes[sizes.index(n) :])) > 1:
+                break
             try:
                 found = self._run(n, tolerance)
                 if last is not None:
@@ -232,7 +237,7 @@ class Search:
             last, tolerance = found, max(finer(tolerance, stages), finest)
         if failure:
             raise failure
-        raise ValueError(missed(self.estimate, self._bound, f"on {sizes[-1]} functions"))
+        raise ValueError(missed(self.estimate, self._bound, f"on {last.n if last else SIZES[-1]} functions"))
 
     def _run(self, n: int, tolerance: float) -> Motion:
         self._bar.set_postfix(functions=n, refresh=False)
@@ -243,7 +248,8 @@ class Search:
         """Whether the coarser motion is within the bounds."""
         change = distances(coarse.fields, fine.fields)
         before, self._change = self._change, over(change, self._bound)
-        ratio = float(np.clip(self._change / before, LEAST, MOST)) if np.isfinite(before) else self._plan.unknown
+        self._ratio = self._change / before
+        ratio = float(np.clip(self._ratio, LEAST, MOST)) if np.isfinite(before) else self._plan.unknown
         ratios = {name: max(ratio, RATE) if name == "omega" else ratio for name in FIELDS}
         self.estimate = {name: max(error / (1 - ratios[name]), coarse.start[name]) for name, error in change.items()}
         if over(self.estimate, self._bound) > 1:

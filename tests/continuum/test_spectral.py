@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from continuum import Rod, Scene, breathing_ring, collocation, exact, rolling_rod, solve, untwisting_rod
+from continuum import Rod, Scene, breathing_ring, collocation, exact, rolling_rod, solve, spectral, untwisting_rod
 from continuum.density import Density
 from continuum.functions import polynomials, waves
 from continuum.galerkin import SpectralRod
@@ -251,3 +251,20 @@ def test_free_ends_keep_their_slope(rolling):
 def test_collapsing_ring_is_refused():
     with pytest.raises(SimulationError, match=r"lost its heading: r' = 0"):
         solve(breathing_ring("unit", duration=30.0, radius=0.7), 1e-4, progress=False)
+
+
+def peaked(s):
+    """A closed line whose twist has a peak of width 0.3."""
+    a = 2 * np.pi * s / UNEVEN["length"]
+    r = (1 + 0.1 * np.cos(2 * a)) * UNEVEN["length"] / (2 * np.pi)
+    return r * np.cos(a), r * np.sin(a), 0.3 * np.cos(3 * a) / (1.2 - np.cos(a)), 0 * s
+
+
+def test_more_functions_are_taken_while_errors_fall_fast_enough(monkeypatch):
+    monkeypatch.setattr(spectral, "SIZES", (15, 19))
+    monkeypatch.setattr(spectral, "MORE", (27, 37, 51))
+    found = solve(untwisting_rod(duration=1.0), tol=1e-6, progress=False)
+    assert found.stats["functions"] in spectral.MORE
+    scene = Scene(rod=Rod(**UNEVEN), duration=0.5, initial=peaked, closed=True)
+    with pytest.raises(ValueError, match=r"tol = 0\.0001 is not reached on (27|37) functions"):
+        solve(scene, tol=1e-4, progress=False)
