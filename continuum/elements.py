@@ -14,50 +14,39 @@ with n = T(phi) (A Gamma_1, G Gamma_2). The natural end conditions are e.n + bet
 
 Integrals are replaced by Gauss-Lobatto sums over elements with polynomials of degree p (weights w, derivative D), for fields and
 variations alike; parameters that vary are taken at the nodes. The inertia of the nodes is then diagonal, and the energy of the sums
-is constant. n . (e psi)' is computed as a force -D^T w n on r, projected on e. Time is integrated by DOP853, with an error far
-below that of the elements.
+is constant. n . (e psi)' is computed as a force -D^T w n on r, projected on e. Time is integrated by DOP853, or by Radau's method
+where damping is stiff, with an error far below that of the elements. Loads: see `continuum.element_loads`.
 
 The method is independent of the chain of discs: it shares only the equations.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
-from numpy.polynomial import legendre
 
+from continuum.element_grid import Grid
+from continuum.element_loads import ElementLoads, breaks
+from continuum.element_march import march
 from continuum.initial import resolve
 from continuum.parameters import Section, sample
 from continuum.pieces import POINTS
 from continuum.rod import Scene
-from discs.arrays import Float, Int
+from discs.arrays import Float, Matrix
 
-DEGREE = 10
-MOST_CALLS = 12 * 2**17  # evaluations of the rates, twelve per step
-TRIED = 12 * 2**8  # evaluations after which their total is predicted
+STIFF = 150.0  # steps are implicit where damping is faster than this times tol^(-1/5), in units of 1/duration
+NONE = np.empty(0)
 UNKNOWNS = ("x", "y", "theta", "phi", "omega", "phi_rate")
-
-
-def lobatto(p: int) -> tuple[Float, Float, Float]:
-    """Gauss-Lobatto nodes and weights on [-1, 1], (p+1,), and the derivative matrix of the polynomial of degree p through them."""
-    basis = legendre.Legendre.basis(p)
-    x = np.concatenate([[-1.0], np.sort(basis.deriv().roots().real), [1.0]])
-    for _ in range(3):  # Newton steps on the inner roots of P_p', to round-off
-        x[1:-1] -= basis.deriv()(x[1:-1]) / basis.deriv(2)(x[1:-1])
-    values = basis(x)
-    weights = 2 / (p * (p + 1) * values**2)
-    gap = x[:, None] - x[None, :]
-    np.fill_diagonal(gap, 1.0)
-    d = values[:, None] / values[None, :] / gap
-    np.fill_diagonal(d, 0.0)
-    np.fill_diagonal(d, -d.sum(axis=1))
-    return x, weights, d
 
 
 @dataclass(frozen=True)
 class Elements:
-    """A scene of a `SteeredRod` on `count` equal elements of degree `DEGREE`.
+    """A scene of a `SteeredRod` on spectral elements of degree `DEGREE`: `count` equal ones without loads.
+
+    Loads that act at a point and patterns that jump have edges there (`element_loads.breaks`). Of the parts of the length between
+    these, each has a multiple of `count` elements, so that twice the count is half the width everywhere.
 
     Unknowns are rows (6, n) at the n nodes, named by UNKNOWNS. The last node of a closed rod is its first.
     """
@@ -66,55 +55,27 @@ class Elements:
     count: int
 
     @cached_property
-    def _rule(self) -> tuple[Float, Float, Float]:
-        x, w, d = lobatto(DEGREE)
-        half = self.scene.rod.length / self.count / 2
-        return x, w * half, d / half
-
-    @cached_property
-    def _expand(self) -> Float:
-        """The matrix from values at the nodes of an element to Legendre coefficients, (DEGREE + 1, DEGREE + 1)."""
-        return np.linalg.inv(legendre.legvander(self._rule[0], DEGREE)).astype(np.float64, copy=False)
-
-    @cached_property
-    def _index(self) -> Int:
-        """Nodes of each element, (count, DEGREE + 1)."""
-        index = DEGREE * np.arange(self.count)[:, None] + np.arange(DEGREE + 1)
-        return index % self.n if self.scene.closed else index
+    def grid(self) -> Grid:
+        """The nodes."""
+        length = self.scene.rod.length
+        parts = np.array([0.0, *breaks(self.scene), length])
+        each = np.maximum(1, np.rint(np.diff(parts) / length * (parts.size - 1))).astype(int) * self.count
+        inner = [a + (b - a) * np.arange(m) / m for a, b, m in zip(parts, parts[1:], each, strict=False)]
+        return Grid(np.append(np.concatenate(inner), length), self.scene.closed)
 
     @property
     def n(self) -> int:
         """Number of nodes."""
-        return DEGREE * self.count + (not self.scene.closed)
+        return self.grid.n
 
-    @cached_property
+    @property
     def s(self) -> Float:
         """Places of the nodes, (n,)."""
-        x = self._rule[0]
-        width = self.scene.rod.length / self.count
-        local = width * (np.arange(self.count)[:, None] + (x + 1) / 2)
-        return local[:, :-1].ravel() if self.scene.closed else np.append(local[:, :-1].ravel(), local[-1, -1])
-
-    @cached_property
-    def weights(self) -> Float:
-        """Share of the length of each node, (n,)."""
-        return self._sum(np.broadcast_to(self._rule[1], self._index.shape))
-
-    def _sum(self, local: Float) -> Float:
-        """Sum of the values of elements (..., count, DEGREE + 1) at the nodes, (..., n)."""
-        total = np.empty((*local.shape[:-2], self.n))
-        inner = self.n - (not self.scene.closed)
-        total[..., :inner] = local[..., :-1].reshape(*local.shape[:-2], -1)
-        if self.scene.closed:
-            total[..., 0] += local[..., -1, -1]
-        else:
-            total[..., -1] = local[..., -1, -1]
-        total[..., DEGREE:inner:DEGREE] += local[..., :-1, -1]
-        return total
+        return self.grid.s
 
     def local(self, q: Float) -> Float:
-        """Rows x, y, theta, phi on elements, (4, count, DEGREE + 1); the last node of a closed rod includes its shift and turns."""
-        values = q[:4, self._index]
+        """Rows x, y, theta, phi on elements, (4, P, DEGREE + 1); the last node of a closed rod includes its shift and turns."""
+        values = q[:4, self.grid.index]
         if self.scene.closed:
             values[:2, -1, -1] += np.array(self.scene.shift)
             values[3, -1, -1] += 2 * np.pi * self.scene.turns
@@ -122,7 +83,7 @@ class Elements:
 
     def _strains(self, q: Float) -> tuple[Float, Float, Float, Float]:
         values = self.local(q)
-        dx, dy, twist, bend = values @ self._rule[2].T
+        dx, dy, twist, bend = self.grid.slope(values)
         cos, sin = np.cos(values[3]), np.sin(values[3])
         return np.stack([cos * dx + sin * dy, cos * dy - sin * dx]), twist, bend, np.stack([cos, sin])
 
@@ -131,36 +92,94 @@ class Elements:
         return self.scene.rod.at(self.s)
 
     @cached_property
-    def _in_elements(self) -> Section[Float]:
-        x, width = self._rule[0], self.scene.rod.length / self.count
-        return self.scene.rod.at(np.minimum(width * (np.arange(self.count)[:, None] + (x + 1) / 2), self.scene.rod.length))
+    def _stiffness(self) -> Float:
+        """Of stretch, shear, torsion and bending on the elements, (4, P, DEGREE + 1)."""
+        there, shape = self.scene.rod.at(self.grid.places), self.grid.places.shape
+        found = there.stretch_stiffness, there.shear_stiffness, there.torsion_stiffness, there.bending_stiffness
+        return np.stack([np.broadcast_to(values, shape) for values in found])
 
-    def energy(self, q: Float) -> float:
-        """Kinetic and potential energy of (6, n)."""
-        rod, there = self._at_nodes, self._in_elements
+    @cached_property
+    def loads(self) -> ElementLoads | None:
+        """The loads of the scene; None for none."""
+        if not self.scene.loads:
+            return None
+        loads = ElementLoads(self.scene, self.grid)
+        loads.check_start(self.start)
+        return loads
+
+    def energy(self, q: Float, rest: Float | float = 0.0) -> float:
+        """Kinetic and potential energy of (6, n), with rest strains (4, P, DEGREE + 1)."""
+        rod = self._at_nodes
         u, twist, bend, _ = self._strains(q)
-        stiffness = there.stretch_stiffness, there.shear_stiffness, there.torsion_stiffness, there.bending_stiffness
-        density = sum(k * strain**2 for k, strain in zip(stiffness, (u[0] - 1, u[1], twist, bend), strict=True))
-        kinetic = self.weights @ (rod.inertia * q[4] ** 2 + rod.heading_inertia * q[5] ** 2)
-        return 0.5 * float((self._rule[1] * density).sum() + kinetic)
+        density = (self._stiffness * (np.stack([u[0] - 1, u[1], twist, bend]) - rest) ** 2).sum(axis=0)
+        kinetic = self.grid.weights @ (rod.inertia * q[4] ** 2 + rod.heading_inertia * q[5] ** 2)
+        own = 0.0 if self.loads is None else self.loads.energy(q)
+        return own + 0.5 * float((self.grid.w * density).sum() + kinetic)
 
-    def rate(self, _: float, flat: Float) -> Float:
-        """The time derivative of the unknowns, flat."""
-        rod, there, (w, d) = self._at_nodes, self._in_elements, self._rule[1:]
-        q = flat.reshape(6, -1)
+    def _torques(self, q: Float, values: Float) -> tuple[Float, Float, Float]:
+        """Of (6, n) and values of signals: torques about the axles and the vertical, but for motors (2, n); e (2, n); and
+        omega' and phi.' on the elements (2, P, DEGREE + 1), without loads 0."""
+        loads, w, bent = self.loads, self.grid.w, np.zeros(1)
         u, twist, bend, (cos, sin) = self._strains(q)
-        n1, n2 = there.stretch_stiffness * (u[0] - 1), there.shear_stiffness * u[1]
-        flux = np.stack([cos * n1 - sin * n2, sin * n1 + cos * n2, there.torsion_stiffness * twist, there.bending_stiffness * bend])
-        local = -(w * flux) @ d
+        strain = np.stack([u[0] - 1, u[1], twist, bend])
+        if loads is not None:
+            strain -= loads.at_rest(values)
+        stress = self._stiffness * strain
+        if loads is not None:
+            bent = self.grid.slope(q[4:, self.grid.index])
+            stress[2:] += loads.viscosity * bent
+        n1, n2 = stress[:2]
+        flux = np.stack([cos * n1 - sin * n2, sin * n1 + cos * n2, stress[2], stress[3]])
+        local = -(w * flux / self.grid.half) @ self.grid.d.T
         local[3] += w * (u[0] * n2 - u[1] * n1)
-        force = self._sum(local)
-        e = rod.radius * np.stack([-np.sin(q[3]), np.cos(q[3])])
+        force = self.grid.sum(local)
+        if loads is not None:
+            force += loads.force(values, q)
+        e = self._at_nodes.radius * np.stack([-np.sin(q[3]), np.cos(q[3])])
+        return np.stack([e[0] * force[0] + e[1] * force[1] + force[2], force[3]]), e, bent
+
+    def rate(self, t: float, flat: Float) -> Float:
+        """The time derivative of the unknowns, flat; with loads followed by the rates of work and dissipation."""
+        loads, q, values = self.loads, flat[: 6 * self.n].reshape(6, -1), NONE
+        if loads is not None:
+            values = loads.values(t)
+            q = loads.held(values, q)
+        torque, e, bent = self._torques(q, values)
         out = np.empty_like(q)
         out[:2] = e * q[4]
         out[2:4] = q[4:]
-        out[4] = (e[0] * force[0] + e[1] * force[1] + force[2]) / (rod.inertia * self.weights)
-        out[5] = force[3] / (rod.heading_inertia * self.weights)
-        return out.ravel()
+        out[4:] = torque / self._inertia
+        if loads is None:
+            return out.ravel()
+        out[4:][loads.driven] = 0.0  # `held` sets these rates
+        power = loads.power(values, out[:4], self._stiffness[2:], bent)
+        power[0] -= torque[loads.driven] @ q[4:][loads.driven]
+        return np.concatenate([out.ravel(), power])
+
+    def _balance(self, times: Float, q: Float, values: Float, spent: Float) -> tuple[Float, Float | None]:
+        """Work and dissipation (F, 2), and torques of motors (F, motors), of a motion (F, 6, n) with signals (F, L + motors).
+
+        spent : (F, 2), the integrals of what `rate` returns for the first two.
+        """
+        loads = self.loads
+        assert loads is not None
+
+        def driven(now: Float, z: Float) -> float:
+            """Energy that depends on time, and that of discs that motors drive."""
+            kinetic = 0.5 * self._inertia[loads.driven] @ z[4:][loads.driven] ** 2
+            return self.energy(z, loads.at_rest(now)) - self.energy(z, loads.rest) + float(kinetic)
+
+        gained = np.array([driven(*pair) for pair in zip(values, q, strict=True)]) - driven(loads.values(0.0), self.start)
+        balance = np.stack([spent[:, 0] + gained, spent[:, 1]], axis=1)
+        if not loads.axles:
+            return balance, None
+        torques = [self._torques(z, now)[0][loads.driven] for now, z in zip(values, q, strict=True)]
+        return balance, loads.changes(times) * self._inertia[loads.driven] - np.array(torques)
+
+    @cached_property
+    def _inertia(self) -> Float:
+        """Of rolling and turning at the nodes, (2, n)."""
+        return np.stack([self._at_nodes.inertia * self.grid.weights, self._at_nodes.heading_inertia * self.grid.weights])
 
     @cached_property
     def start(self) -> Float:
@@ -173,42 +192,51 @@ class Elements:
         """Largest difference between the initial fields and their polynomials on the elements, for each field; also for parameters
         of the rod that vary, over their range."""
         s, _ = resolve(self.scene).quadrature(POINTS)
-        truth, parameters = self.scene.fields(s), [*self.scene.rod.varying]
-        there = [getattr(self._in_elements, name) for name in parameters]
-        known = np.concatenate([self.local(self.start), self.start[4:, self._index], *(values[None] for values in there)])
-        at = s / self.scene.rod.length * self.count
-        element = np.minimum(at.astype(int), self.count - 1)
-        found = np.einsum("fsk,sk->fs", (known @ self._expand.T)[:, element], legendre.legvander(2 * (at - element) - 1, DEGREE))
+        truth, varying = self.scene.fields(s), self.scene.rod.varying
+        there = [sample(name, function, self.grid.places)[None] for name, function in varying.items()]
+        found = self.grid.sample(np.concatenate([self.local(self.start), self.start[4:, self.grid.index], *there]), s)
         off = {name: float(np.abs(row - truth[name]).max()) for name, row in zip(UNKNOWNS, found, strict=False)}
-        for name, row in zip(parameters, found[len(UNKNOWNS) :], strict=True):
-            value = sample(name, self.scene.rod.varying[name], s)
+        for (name, function), row in zip(varying.items(), found[len(UNKNOWNS) :], strict=True):
+            value = sample(name, function, s)
             off[name] = float(np.abs(row - value).max() / max(np.ptp(value), 1e-9 * value.max()))
         return off
 
-    def run(self, times: Float, tol: float) -> Float:
-        """The unknowns at the times, (F, 6, n), with an error of the time steps below tol."""
-        calls = 0
+    def sample(self, q: Float, s: Float) -> Float:
+        """Rows x, y, theta, phi, theta., phi. of (6, n) at places s (S,), (6, S)."""
+        return self.grid.sample(np.concatenate([self.local(q), q[4:, self.grid.index]]), s)
 
-        def rate(t: float, flat: Float) -> Float:
-            nonlocal calls
-            calls += 1
-            if calls > MOST_CALLS or (calls == TRIED and t * MOST_CALLS < TRIED * span[1]):
-                raise ValueError(
-                    f"tol is not reached in {MOST_CALLS // 12} time steps of {self.count} elements: "
-                    "ask for a larger tol or a shorter duration"
-                )
-            return self.rate(t, flat)
+    def run(self, times: Float, tol: float) -> "Course":
+        """The motion at the times, with an error of the time steps below tol."""
+        loads, start, size = self.loads, self.start.ravel(), 6 * self.n
+        what = f"{self.grid.count} elements"
+        if loads is None:
+            q = march(self.rate, start, times, np.zeros(1), tol, what).reshape(-1, 6, self.n)
+            return Course(q, np.array([self.energy(z) for z in q]))
+        fastest = loads.fastest(self._inertia, float(np.max(self._at_nodes.radius)))
+        # explicit steps are below 5/fastest; the number of implicit ones, which cost more, grows like tol^(-1/5)
+        pattern = self._pattern if fastest * times[-1] > STIFF * tol**-0.2 else None
+        found = march(self.rate, np.append(start, [0.0, 0.0]), times, loads.timing.edges, tol, what, pattern)
+        q = found[:, :size].reshape(-1, 6, self.n)
+        values = np.array([loads.values(t) for t in times])
+        q = np.array([loads.held(now, z) for now, z in zip(values, q, strict=True)])
+        energy = np.array([self.energy(z, loads.at_rest(now)) for now, z in zip(values, q, strict=True)])
+        return Course(q, energy, *self._balance(times, q, values, found[:, size:]))
 
-        span = 0.0, max(float(times[-1]), 1e-300)
-        found = scipy.integrate.solve_ivp(rate, span, self.start.ravel(), "DOP853", t_eval=times, rtol=1e-12, atol=tol)
-        if not found.success:
-            raise ValueError(f"the field could not be integrated: {found.message}; ask for a larger tol or a shorter duration")
-        unknowns: Float = found.y.T.reshape(len(times), 6, -1)
-        return unknowns
+    @cached_property
+    def _pattern(self) -> Matrix:
+        """Where the Jacobian of `rate` has entries: between unknowns of one element. Work and dissipation act on nothing. Their own
+        rows are left out, which delays them by one iteration of a step: each column would have entries there, and none could be
+        differenced together."""
+        near = scipy.sparse.lil_array((self.n, self.n))
+        for nodes in self.grid.index:
+            near[np.ix_(nodes, nodes)] = 1
+        return scipy.sparse.block_diag([scipy.sparse.kron(np.ones((6, 6)), near), np.zeros((2, 2))], format="csc")
 
-    def sample(self, q: Float, cells: int) -> Float:
-        """Rows x, y, theta, phi, theta., phi. of (6, n) at equally spaced places, `cells` in each element, (6, places)."""
-        through = legendre.legvander(np.linspace(-1, 1, cells, endpoint=False), DEGREE) @ self._expand
-        values = np.concatenate([self.local(q), q[4:, self._index]])
-        places = (values @ through.T).reshape(6, -1)
-        return places if self.scene.closed else np.column_stack([places, q[:, -1]])
+
+class Course(NamedTuple):
+    """A motion at times: unknowns (F, 6, n) and energy (F,); with loads work and dissipation (F, 2) and torques of motors."""
+
+    q: Float
+    energy: Float
+    balance: Float | None = None
+    reaction: Float | None = None

@@ -18,7 +18,7 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike
 
-from continuum.elements import lobatto
+from continuum.element_grid import lobatto
 from discs import Chain, checks
 from discs.arrays import Float, Spline
 from discs.chains import stencils

@@ -9,7 +9,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from continuum.density import Density
-from continuum.elements import lobatto
+from continuum.element_grid import lobatto
 from continuum.parameters import sample
 from continuum.rod import Rod
 from discs.arrays import Float

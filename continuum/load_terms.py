@@ -65,6 +65,13 @@ class Terms:
         shared: Float = np.where(there, values, 0.0) / max(np.count_nonzero(there), 1)
         return shared
 
+    def row(self, load: Any) -> int:
+        """The row of the angle that a load is about."""
+        if load.about != "roll":
+            name = type(load).__name__
+            raise ValueError(f"{name}: about={load.about!r} is for rods with headings of their own; here they follow the line")
+        return ROLL
+
     def drive(self, load: Any, rows: dict[int, Float], strain: Float | float = 0.0) -> None:
         push = np.zeros((4, self.s.size))
         for row, values in rows.items():
@@ -96,9 +103,7 @@ def _refuse_headings(load: OnRod, *names: str) -> None:
 
 @add.register
 def _(load: Torque, to: Terms) -> None:
-    if load.about != "roll":
-        raise ValueError(f"Torque: about={load.about!r} is for rods with headings of their own; here they follow the line")
-    to.drive(load, {ROLL: to.shared(load, "pattern")})
+    to.drive(load, {to.row(load): to.shared(load, "pattern")})
 
 
 @add.register

@@ -148,7 +148,7 @@ def split(data: Sampled, edges: Float) -> Cut:
         good = (misfit <= allowed).all(axis=0)
         misfit = np.maximum(misfit, _misfit_at_probes(data, lo, hi, c, good))
         noise = (misfit <= NOISE * data.size[:, None]) & _in_both_halves(misfit > before / 4)
-        ratio = np.where(noise, 0.0, misfit / allowed)
+        ratio = np.where(noise, 0.0, misfit / np.maximum(allowed, 1e-300))  # a function that vanishes is allowed nothing
         lost = (ratio > 1).any(axis=0) & (hi - lo < 2 * SHORTEST * data.length)
         good = (ratio <= 1).all(axis=0) | lost
         # coefficients below rounding are dropped, as derivatives would amplify them

@@ -8,7 +8,8 @@ import numpy as np
 from tqdm import tqdm
 
 from continuum.bounds import LEAST, missed, over
-from continuum.elements import DEGREE, UNKNOWNS, Elements
+from continuum.element_grid import DEGREE
+from continuum.elements import UNKNOWNS, Course, Elements
 from continuum.initial import resolve
 from continuum.rod import Scene
 from discs import Solution
@@ -17,18 +18,24 @@ from discs.arrays import Float
 RATES = ("omega", "phi_rate")
 MOST = 8.0  # largest ratio of an error to a change
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # numbers of elements
+SURE = 4  # changes after which slowly falling errors count as such
+SLOW = 3.0  # order of errors below which fields count as rough
+FRONTS = (
+    "; errors fall slowly: loads or rest shapes that start at once, against the conditions at an end, send fronts along the rod; "
+    "start them smoothly, as by signals.smooth"
+)
 PLACES = 1024  # nodes of a solution, or a multiple
 
 
 class Found(NamedTuple):
-    """A motion on elements at times (F,): unknowns (F, 6, n)."""
+    """A motion on elements."""
 
     elements: Elements
-    q: Float
+    course: Course
 
-    def sample(self, places: int) -> Float:
-        """The unknowns at equally spaced places, a multiple of the number of elements, (6, F, places)."""
-        return np.stack([self.elements.sample(q, places // self.elements.count) for q in self.q], axis=1)
+    def sample(self, s: Float) -> Float:
+        """The unknowns at places s (S,), (6, F, S)."""
+        return np.stack([self.elements.sample(q, s) for q in self.course.q], axis=1)
 
 
 def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
@@ -69,25 +76,34 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progr
             bar.update()
             if len(runs) < 2:
                 continue
-            places = lcm(PLACES, *(run.elements.count for run in runs))
-            values, finer = (run.sample(places) for run in runs)
+            cells = lcm(PLACES, *(run.elements.count for run in runs))
+            s = scene.rod.length / cells * np.arange(cells + (not scene.closed), dtype=float)
+            values, finer = (run.sample(s) for run in runs)
             changes.append(np.abs(values - finer).max(axis=(1, 2)))
             if len(changes) < 2:
                 continue
             found = runs[0].elements
             last, smooth = counts.index(count), not resolve(scene).kinks
-            factors = falls(np.array(changes[-3:]), counts[last - len(changes[-3:]) : last + 1], np.inf if smooth else 1.0)
+            used = counts[last - len(changes[-3:]) : last + 1]
+            factors = falls(np.array(changes[-3:]), used, np.inf if smooth else 1.0)
             estimates = zip(UNKNOWNS, factors * changes[-1] + rest, strict=True)
             error = {name: max(float(estimate), found.misfit[name]) for name, estimate in estimates}
             if over(error, bound) <= 1:
                 break
-            if count == counts[-1] or _hopeless(scene, over(error, bound), found.count):
-                raise ValueError(missed(error, bound, f"on {found.n} nodes") + _corners(scene))
+            order = np.inf if smooth else 2.0  # at best
+            measured = min(orders(np.array(changes[-3:]), used)[UNKNOWNS.index(name)] for name in bound)
+            fronts = bool(scene.loads) and len(changes) >= SURE and measured < SLOW
+            if fronts:
+                order = max(measured, 1.0) + 0.5
+            if count == counts[-1] or _hopeless(over(error, bound), found.count, order):
+                raise ValueError(missed(error, bound, f"on {found.n} nodes") + _corners(scene) + (FRONTS if fronts else ""))
     return Solution(
         t=times,
-        s=scene.rod.length / places * np.arange(values.shape[-1], dtype=float),
-        energy=np.array([found.energy(q) for q in runs[0].q]),
-        stats={"method": "elements", "order": DEGREE, "elements": found.count, "nodes": found.n},
+        s=s,
+        energy=runs[0].course.energy,
+        balance=runs[0].course.balance,
+        reaction=runs[0].course.reaction,
+        stats={"method": "elements", "order": DEGREE, "elements": found.grid.count, "nodes": found.n},
         error_estimate=error,
         **dict(zip(UNKNOWNS, values, strict=True)),
     )
@@ -102,14 +118,20 @@ def falls(changes: Float, counts: Sequence[int], most: float) -> Float:
     most : largest order p.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        p = np.log(changes[0] / changes[-1]) / np.log(counts[-2] / counts[-len(changes) - 1])
-        factor: Float = 1 / (1 - (counts[-2] / counts[-1]) ** np.clip(np.nan_to_num(p), 1e-3, most))
+        factor: Float = 1 / (1 - (counts[-2] / counts[-1]) ** np.clip(orders(changes, counts), 1e-3, most))
     return np.clip(factor, 1.5, MOST)
 
 
-def _hopeless(scene: Scene, times: float, count: int) -> bool:
-    """Whether errors, `times` times the bounds, will stay above them: with corners they fall like 1/count^2 at best."""
-    return bool(resolve(scene).kinks) and times * (count / COUNTS[-2]) ** 2 > 1
+def orders(changes: Float, counts: Sequence[int]) -> Float:
+    """The orders p at which changes fall, (6,); arguments are as for `falls`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: Float = np.nan_to_num(np.log(changes[0] / changes[-1]) / np.log(counts[-2] / counts[-len(changes) - 1]))
+    return found
+
+
+def _hopeless(times: float, count: int, order: float) -> bool:
+    """Whether errors, `times` times the bounds, will stay above them if they fall at most at an order in the number of elements."""
+    return bool(times * (count / COUNTS[-2]) ** order > 1)
 
 
 def _corners(scene: Scene) -> str:

@@ -86,8 +86,6 @@ def solve(
     if not isinstance(scene, Scene):
         instead = "; simulate(problem) runs discs" if isinstance(scene, Problem) else ""
         raise ValueError(f"solve takes a Scene, such as untwisting_rod(); got {type(scene).__name__}{instead}")
-    if scene.loads and scene.steered:
-        raise ValueError("solve takes no loads of a SteeredRod; simulate(lump(scene, n)) runs its discs with them")
     fitting = ("elements",) if scene.steered else ("richardson", "leapfrog")
     if scene.rod.curvature == "linear" and not scene.steered:
         fitting = ("spectral", *fitting)

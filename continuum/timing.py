@@ -24,7 +24,7 @@ class Timing:
 
     def __init__(self, scene: Scene) -> None:
         duration = scene.duration
-        given = [(getattr(load, "signal", None), type(load).__name__) for load in scene.loads]
+        given = [(getattr(load, "signal", None), type(load).__name__) for load in scene.loads]  # that of a motor is its rate
         changing = [(signal, name) for signal, name in given if signal is not None]
         self.edges, self.stops = np.array([0.0, duration]), np.array([duration])
         if not changing:

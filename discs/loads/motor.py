@@ -39,10 +39,13 @@ class Motor(OnRod):
     about: str = "roll"
 
     def on(self, chain: Discs) -> "Held":
+        return Held((Axle(self._row(chain, self.about), self._disc(chain, self.at), self.signal),), spread(chain, {}))
+
+    @property
+    def signal(self) -> Signal:
+        """The rate as a function of t."""
         rate: Any = self.rate
-        if not callable(rate):
-            rate = signals.table([0.0], [checks.number("rate of Motor", rate)])
-        return Held((Axle(self._row(chain, self.about), self._disc(chain, self.at), rate),), spread(chain, {}))
+        return rate if callable(rate) else signals.table([0.0], [checks.number("rate of Motor", rate)])
 
 
 class Axle(NamedTuple):
@@ -51,6 +54,14 @@ class Axle(NamedTuple):
     row: int
     disc: int
     rate: Signal
+
+
+def change(rate: Signal, t: float, duration: float) -> float:
+    """The derivative of a rate at a time, by differences of second order within the duration."""
+    step = 1e-5 * duration
+    times = np.clip(t - step, 0.0, duration - 2 * step) + step * np.arange(3)
+    x = (t - times[1]) / step
+    return float(signals.values(rate, times, "Motor") @ np.array([x - 0.5, -2 * x, x + 0.5]) / step)
 
 
 class Held(Load):
@@ -74,13 +85,8 @@ class Held(Load):
         return np.array([signals.values(axle.rate, np.array([t]), "Motor")[0] for axle in self.axles])
 
     def changes(self, t: float, duration: float) -> Float:
-        """Rates of change of the given rates, (motors,), by differences of second order within the duration."""
-        step = 1e-5 * duration
-        times = np.clip(t - step, 0.0, duration - 2 * step) + step * np.arange(3)
-        x = (t - times[1]) / step
-        values = np.array([signals.values(axle.rate, times, "Motor") for axle in self.axles])
-        found: Float = values @ np.array([x - 0.5, -2 * x, x + 0.5]) / step
-        return found
+        """Rates of change of the given rates, (motors,)."""
+        return np.array([change(axle.rate, t, duration) for axle in self.axles])
 
     def applied(self, t: float, q: Float, v: Float) -> Float:
         return self._nothing if self._other is None else self._other.force(t, q, v)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from continuum import Rod, Scene, breathing_ring, solve, steered_rod, untwisting_rod
+from continuum import Rod, Scene, breathing_ring, solve, untwisting_rod
 from continuum.balance import balances
 from continuum.dispersion import response
 from continuum.spectral import Runner
@@ -242,9 +242,7 @@ def test_loaded_fields_are_saved_and_have_no_balances(tmp_path):
     np.testing.assert_array_equal(load(tmp_path / "loaded.nc").dissipated, run.dissipated)
 
 
-def test_loads_of_rods_with_headings_and_of_the_paper_s_scheme_are_refused():
-    with pytest.raises(ValueError, match=r"solve takes no loads of a SteeredRod; simulate\(lump\(scene, n\)\)"):
-        solve(replace(steered_rod(), loads=(Torque(1.0),)), progress=False)
+def test_the_paper_s_scheme_takes_loads_with_a_potential():
     with pytest.raises(ValueError, match="'leapfrog' takes loads that are part of the energy only"):
         solve(replace(untwisting_rod(), loads=(Torque(1.0),)), method="leapfrog", progress=False)
 

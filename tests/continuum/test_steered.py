@@ -8,7 +8,8 @@ import pytest
 from compare import convergence, lump
 from continuum import SteeredRod, solve, steered_rod, untwisting_rod
 from continuum.dispersion import steered_frequencies
-from continuum.elements import DEGREE, Elements, lobatto
+from continuum.element_grid import DEGREE, lobatto
+from continuum.elements import Elements
 from continuum.mesh import semidiscretise
 from continuum.scenes import PAPER
 from discs import Midpoint, SimulationError, Suzuki4, simulate
@@ -52,7 +53,7 @@ def test_estimate_is_the_error(tol):
     scene = steered_rod(14.0, 5.0, 0.6, duration=3.0, twist=0.8, **other)
     field = solve(scene, tol, frames=3, progress=False)
     elements = Elements(scene, 8)
-    truth = np.stack([elements.sample(q, (field.s.size - 1) // 8) for q in elements.run(field.t, 1e-12)], axis=1)
+    truth = np.stack([elements.sample(q, field.s) for q in elements.run(field.t, 1e-12).q], axis=1)
     for row, name in enumerate(("x", "y", "theta", "phi")):
         error = np.abs(getattr(field, name) - truth[row]).max()
         assert error <= tol
@@ -120,7 +121,7 @@ def test_waves_of_the_straight_rod(branch, omega):
     frequency, scene = wave(None)
     elements = Elements(scene, 4)
     times = np.linspace(0, 3, 4)
-    q_t = elements.run(times, 1e-13)
+    q_t = elements.run(times, 1e-13).q
     np.testing.assert_allclose(q_t[:, 3], q_t[0, 3] * np.cos(frequency * times)[:, None], atol=3e-12)
     assert elements.n == 4 * DEGREE
 
@@ -252,7 +253,7 @@ def test_corner_s_error_is_measured(monkeypatch):
     scene = replace(bumped(lambda s: 0.2 * np.abs(s - 2.13)), duration=0.1)
     field = solve(scene, 5e-3, frames=3, progress=False)
     elements = Elements(scene, 64)
-    truth = np.stack([elements.sample(q, (field.s.size - 1) // 64) for q in elements.run(field.t, 1e-6)], axis=1)
+    truth = np.stack([elements.sample(q, field.s) for q in elements.run(field.t, 1e-6).q], axis=1)
     for row, name in enumerate(("x", "y", "theta", "phi")):
         assert np.abs(getattr(field, name) - truth[row]).max() <= field.error_estimate[name] <= 5e-3
     monkeypatch.setattr("continuum.refinement.COUNTS", (16, 24, 32, 48, 64))
@@ -280,7 +281,7 @@ def test_data_that_elements_do_not_hold(scene, message):
 
 
 def test_steps_of_elements_are_bounded(monkeypatch):
-    monkeypatch.setattr("continuum.elements.MOST_CALLS", 1200)
+    monkeypatch.setattr("continuum.element_march.MOST_CALLS", 1200)
     with pytest.raises(ValueError, match=r"tol is not reached in 100 time steps of 1 elements.*larger tol or a shorter duration"):
         solve(steered_rod(duration=1e5), 1e-3, progress=False)
     monkeypatch.undo()
