@@ -19,7 +19,13 @@ from discs.pictures import geometry
 from discs.pictures.figures import given_or_new
 from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE
 
-KIND = {"springs": "plain springs", "consistent": "consistent ends", "paper": "the paper's ends", "ring": "ring"}
+KIND = {
+    "springs": "plain springs",
+    "consistent": "consistent ends",
+    "paper": "the paper's ends",
+    "ring": "ring",
+    "own": "own headings",
+}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
 
 

@@ -1,9 +1,11 @@
-"""Loaded rods: N discs against the field, N -> infinity, under one load after the other."""
+"""Loaded rods and rods that vary: N discs against the field, N -> infinity, under one load after the other."""
 
 import csv
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -11,7 +13,7 @@ from tqdm import tqdm
 from compare.outputs import fresh_files
 from compare.results import Study, format_table
 from compare.study import convergence
-from continuum import Scene, breathing_ring, solve, untwisting_rod
+from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
 from discs.arrays import Float
 from discs.loads import Damping, Rest, Slope, Torque, signals
 
@@ -45,16 +47,47 @@ ON_A_RING = {
 }
 
 
+def wavy(s: Float, mean: float, depth: float, q: float, phase: float = 0.0) -> Float:
+    """A parameter that varies along the rod, between mean (1 - depth) and mean (1 + depth)."""
+    return mean * (1 + depth * np.cos(q * s + phase))
+
+
+def varying(q: float) -> dict[str, Any]:
+    """The paper's parameters, each changing by a factor of two to four along waves of wave number q."""
+    return {
+        "density": partial(wavy, mean=1.0, depth=0.5, q=q, phase=-np.pi / 2),
+        "spin_inertia": partial(wavy, mean=1.0, depth=0.5, q=q, phase=np.pi),
+        "torsion_stiffness": partial(wavy, mean=0.8, depth=0.4, q=q),
+        "bending_stiffness": partial(wavy, mean=0.7, depth=0.6, q=2 * q, phase=-np.pi / 2),
+        "radius": partial(wavy, mean=1.0, depth=0.4, q=q),
+    }
+
+
 def scenes() -> dict[str, Scene]:
-    """The paper's rod under each load, and a ring."""
+    """The paper's rod under each load, and a ring; both with parameters that vary, and such a rod with headings of its own."""
     rod, ring = untwisting_rod(duration=DURATION), breathing_ring(duration=1.0, omega=0.2)
     on_rod = {name: replace(rod, loads=loads) for name, loads in LOADS.items()}
-    return on_rod | {name: replace(ring, loads=loads) for name, loads in ON_A_RING.items()}
+    on_ring = {name: replace(ring, loads=loads) for name, loads in ON_A_RING.items()}
+    half, whole = np.pi / rod.rod.length, 2 * np.pi / rod.rod.length
+    beams: dict[str, Any] = {
+        "stretch_stiffness": partial(wavy, mean=10.0, depth=0.4, q=half),
+        "shear_stiffness": partial(wavy, mean=10.0, depth=0.4, q=half, phase=np.pi),
+        "heading_inertia": partial(wavy, mean=0.25, depth=0.4, q=half),
+    }
+    uneven = {
+        "varying rod": untwisting_rod(duration=DURATION, **varying(half)),
+        "varying rod, unit law": untwisting_rod("unit", duration=DURATION, **varying(half)),
+        "varying ring": breathing_ring(duration=0.5, omega=0.2, **varying(whole)),
+        "varying, own headings": steered_rod(duration=1.5, **varying(half), **beams),
+    }
+    return on_rod | on_ring | uneven
 
 
 def study(scene: Scene, n: tuple[int, ...], tol: float) -> list[Study]:
     """Discs against the field of a scene, with each kind of ends."""
     field = solve(scene, tol, frames=1, progress=False)
+    if scene.steered:
+        return [replace(convergence(scene, n, "springs", field, progress=False), ends="own")]
     ends = ("ring",) if scene.closed else ("springs", "consistent")
     return [convergence(scene, n, "springs" if kind == "ring" else kind, field, progress=False) for kind in ends]
 

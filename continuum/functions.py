@@ -167,14 +167,19 @@ def waves(n: int, density: Density) -> Functions:
 
 
 def unresolved(given: Functions, rod: Rod, s: Float, w: Float) -> float:
-    """The part of a rod's parameters that functions miss, 0 if none varies: the largest int |p - p through its nodes|/int p.
+    """The part of a rod's parameters that functions miss, 0 if none varies: the largest int |L (p - p through the nodes)|/int p.
+
+    L is the projection on polynomials of degree n/4. What a smooth p has beyond the functions is short waves, which hardly matter;
+    what is narrower than the nodes are apart changes long waves too.
 
     s, w : places and weights (S,) of a quadrature.
     """
-    missed = [0.0]
+    missed, low = [0.0], legendre.legvander(2 * s / rod.length - 1, given.s.size // 4)
+    unit = (2 * np.arange(low.shape[1]) + 1) / rod.length
     for name, function in rod.varying.items():
         known, there = (sample(name, function, places) for places in (given.s, s))
-        missed.append(float(w @ np.abs(given.field(s) @ known - there)) / max(float(w @ there), 1e-300))
+        off = low @ (unit * (low.T @ (w * (given.field(s) @ known - there))))
+        missed.append(float(w @ np.abs(off)) / max(float(w @ there), 1e-300))
     return max(missed)
 
 

@@ -1,6 +1,7 @@
 """Scene files that are not as they should be; good ones: test_solve.py, any: test_bad_input.py."""
 
 import os
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from compare import lump
 from compare.entrants import peers
 from continuum import solve
 from continuum.files import read_scene
+from continuum.parameters import polynomial, table
 from discs.loads import signals
 
 
@@ -100,6 +102,45 @@ def test_loads_in_a_file_are_those_of_the_discs(tmp_path):
 def test_loads_that_a_file_cannot_hold(content, message, tmp_path):
     (tmp_path / "scene.toml").write_text('scene = "untwisting_rod"\n[[loads]]\n' + content)
     with pytest.raises(ValueError, match=message):
+        read_scene(tmp_path / "scene.toml")
+
+
+VARYING = """
+scene = "untwisting_rod"
+density = { name = "polynomial", coefficients = [1.0, 0.25] }
+radius = { name = "table", s = [0.0, 2.0, 4.0], values = [1.0, 0.7, 0.8] }
+bending_stiffness = { name = "table", file = "k.csv" }
+"""
+
+
+def test_parameters_that_vary(tmp_path):
+    (tmp_path / "scene.toml").write_text(VARYING)
+    (tmp_path / "k.csv").write_text("0, 0.7\n4.0, 1.4\n")
+    scene = read_scene(tmp_path / "scene.toml")
+    assert scene.rod.density == polynomial([1.0, 0.25])
+    assert scene.rod.radius == table([0.0, 2.0, 4.0], [1.0, 0.7, 0.8])
+    chain = lump(scene, 5).chain
+    np.testing.assert_array_equal(chain.density, [1.0, 1.25, 1.5, 1.75, 2.0])
+    np.testing.assert_allclose(chain.bending_stiffness, [0.875, 1.05, 1.225])
+    np.testing.assert_allclose(np.asarray(chain.radius)[[0, 2, 4]], [1.0, 0.7, 0.8])
+    assert chain.torsion_stiffness[0] == 0.8
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("density = { coefficients = [1.0] }", 'density must be a table with its name, as { name = "polynomial", ... }'),
+        ('density = { name = "sine", rate = 1.0 }', "density must be one of 'polynomial', 'table'; got 'sine'"),
+        ('density = { name = "polynomial" }', "polynomial needs coefficients"),
+        ('density = { name = "polynomial", coefficients = [1.0, -0.5] }', "density must be finite and above 0; got 0 at s = 2"),
+        ('radius = { name = "table", s = [0.0, 1.0] }', "table needs values"),
+        ('radius = { name = "table", file = "scene.toml" }', "must be lines 's, value'"),
+        ('length = { name = "polynomial", coefficients = [4.0] }', "length must be a positive finite number"),
+    ],
+)
+def test_parameters_that_a_file_cannot_hold(content, message, tmp_path):
+    (tmp_path / "scene.toml").write_text('scene = "untwisting_rod"\n' + content)
+    with pytest.raises(ValueError, match=re.escape(message)):
         read_scene(tmp_path / "scene.toml")
 
 
