@@ -192,7 +192,8 @@ class Problem:
 
     @cached_property
     def ill_posed(self) -> str:
-        """The warning for a chain without bending stiffness under a law of rolling that depends on stretch; empty if there is none.
+        """The warning for a chain without bending stiffness, along all or a part of it, under a law of rolling that depends on
+        stretch; empty for others.
 
         With K = 0 the straight rod rolling at the rate omega amplifies waves of length 2 pi/q at the rate sigma = u q, where
         M u^4 + (beta - gamma alpha R^2 omega^2) u^2 = gamma beta R^2 omega^2 with gamma = `stretching(law)`, 1 under the field law
@@ -200,15 +201,20 @@ class Problem:
         off at sigma <= R omega/k, so runs with more and more discs do not converge.
         """
         chain = self.chain
-        if not isinstance(chain, Chain) or np.any(chain.bending_stiffness) or not stretching(chain.rolling_law):
+        if not isinstance(chain, Chain) or not stretching(chain.rolling_law):
             return ""
+        limp = np.asarray(chain.bending_stiffness) == 0
+        inside = np.flatnonzero(limp[:-2] & limp[1:-1] & limp[2:])  # three bends in a row
+        if not limp.all() and not inside.size:
+            return ""
+        where = "" if limp.all() else f", from s = {chain.bends[inside[0]]:.4g} on,"
         if not np.any(chain.radius) or (self.energy() <= 0 and not self.loads):  # without energy nothing moves
             return ""
         rate = np.max(np.asarray(chain.radius) * np.abs(self.initial.omega)) / chain.k
         now = f", at the start up to {rate:.3g} per unit of time" if rate > 0 else ""
         return (
-            f"bending_stiffness is 0 under rolling={chain.rolling!r}: the equations of a rolling rod are ill posed, short waves "
-            f"grow at rates proportional to the number of discs{now}, and there is no limit of many discs; take "
+            f"bending_stiffness is 0{where} under rolling={chain.rolling!r}: the equations of a rolling rod are ill posed, short "
+            f"waves grow at rates proportional to the number of discs{now}, and there is no limit of many discs; take "
             "bending_stiffness > 0 or rolling='unit'"
         )
 

@@ -21,6 +21,13 @@ def test_a_limp_rolling_rod_is_warned_of():
         simulate(twisted, "leapfrog", progress=False)
 
 
+def test_a_limp_part_of_a_rod_is_warned_of():
+    """K = 0 beyond s = 2: the motions of 65, 129, 257, 513 discs differ by .01, .26, .30 in theta."""
+    part = lump(untwisting_rod(bending_stiffness=lambda s: np.maximum(2 - s, 0), duration=0.01), 17)
+    with pytest.warns(UserWarning, match=r"bending_stiffness is 0, from s = 2 on, under rolling='field'.*no limit"):
+        simulate(part, dt=0.01, progress=False)
+
+
 def test_the_rate_that_is_told_bounds_the_growth():
     rod = rolling_rod(bending_stiffness=0.0, radius=0.7, density=1.3, spin_inertia=0.6, torsion_stiffness=0.9).rod
     k, omega = 0.1, 1.5
@@ -35,8 +42,9 @@ def test_the_rate_that_is_told_bounds_the_growth():
         rolling_rod(duration=0.01),
         rolling_rod(bending_stiffness=0.0, rolling="unit", duration=0.01),
         replace(untwisting_rod(bending_stiffness=0.0, twist=0.0), duration=0.01),
+        untwisting_rod(bending_stiffness=lambda s: 0.2 * (4 - s), duration=0.01),
     ],
-    ids=["stiff", "unit law", "at rest"],
+    ids=["stiff", "unit law", "at rest", "tapered"],
 )
 def test_others_are_not(scene):
     with warnings.catch_warnings():
