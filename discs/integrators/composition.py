@@ -46,9 +46,11 @@ class Composition(OneStep, ABC):
         return replace(self, base=self.base.with_sweeps(tolerance))
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
+        stuck = work.unconverged + 1
         for fraction in self.fractions:
             z = self.base.step(system, z, t, fraction * h, work)
             t += fraction * h
+        work.unconverged = min(work.unconverged, stuck)  # one step, whatever number of substeps
         return z
 
     @cached_property

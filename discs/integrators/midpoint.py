@@ -147,7 +147,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
         do.spend(chain, time + 0.5 * tau, tau, move, 2 / tau)
         time += tau
         solves += sweep
-        unconverged += stuck(method, sweep)
+        unconverged = max(unconverged, stuck(method, sweep))
         advance(now, move, 2.0, after)
         for row in range(p.shape[0]):
             mean, start, end = p[row], now.pi[row], after.pi[row]

@@ -9,7 +9,7 @@ import pytest
 
 from continuum import breathing_ring, untwisting_rod
 from continuum.mesh import semidiscretise
-from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, simulate, suggest_dt
+from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain, Suzuki4, simulate, suggest_dt
 from discs.chains.twist import untwisting_chain
 from discs.integrators import METHODS
 from discs.running.frames import steps_before
@@ -158,6 +158,20 @@ def test_fewer_sweeps_are_counted():
     assert run.stats["steps"] == 20
     assert run.stats["solves"] == 40
     assert run.stats["unconverged"] == 20
+
+
+@pytest.mark.parametrize("engine", ["compiled", "plain"])
+def test_a_step_of_several_substeps_counts_once(engine, kernels_as_python):
+    with pytest.warns(UserWarning, match=r"suzuki4: 4 of 4 steps did not converge"):
+        run = simulate(
+            uneven(5, Model("springs", "field")),
+            Suzuki4(Midpoint(sweeps=2, tolerance=1e-15)),
+            0.25,
+            frames=1,
+            progress=False,
+            engine=engine,
+        )
+    assert run.stats["unconverged"] == 4
 
 
 def test_two_steered_discs():
