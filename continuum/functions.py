@@ -167,14 +167,14 @@ def waves(n: int, density: Density) -> Functions:
 
 
 def unresolved(given: Functions, rod: Rod, s: Float, w: Float) -> float:
-    """The part of a rod's parameters that functions miss, 0 if none varies: the largest int |L (p - p through the nodes)|/int p.
+    """The part of a rod's parameters that functions miss: the largest int |L (p - p through the nodes)|/int p.
 
     L is the projection on polynomials of degree n/4. What a smooth p has beyond the functions is short waves, which hardly matter;
     what is narrower than the nodes are apart changes long waves too.
 
     s, w : places and weights (S,) of a quadrature.
     """
-    missed, low = [0.0], legendre.legvander(2 * s / rod.length - 1, given.s.size // 4)
+    missed, low = [], legendre.legvander(2 * s / rod.length - 1, given.s.size // 4)
     unit = (2 * np.arange(low.shape[1]) + 1) / rod.length
     for name, function in rod.varying.items():
         known, there = (sample(name, function, places) for places in (given.s, s))

@@ -124,8 +124,8 @@ class Runner:
         if steps.lengths:
             self._first = steps.lengths[0]
         start = distances(begun, initial)
-        missed = unresolved(rod.functions, self._scene.rod, *resolve(self._scene).quadrature(POINTS))
-        if missed:
+        if self._scene.rod.varying:
+            missed = unresolved(rod.functions, self._scene.rod, *resolve(self._scene).quadrature(POINTS))
             start = {name: start[name] + missed * moved for name, moved in distances(fields, begun).items()}
         balance = None
         if rod.loads:  # what signals change of the energy is work, too
