@@ -171,8 +171,8 @@ def about(path: str | Path) -> str:
 
 
 def _told(name: str, value: object) -> str:
-    """A line for a parameter of a scene; of one that varies along the rod its range."""
-    if isinstance(value, list) and len(value) > 1 and all(isinstance(entry, float) for entry in value):
+    """A line for a parameter of a scene; of one that varies along the rod, a list of its values, the range."""
+    if isinstance(value, list) and len(value) > 2 and all(isinstance(entry, float) for entry in value):
         return f"{printable(name)}: varies along the rod, {min(value):.6g} to {max(value):.6g}"
     return f"{printable(name)} = {printable(value)}"
 
