@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 
 from continuum.files import read_scene
 from continuum.mesh import semidiscretise
@@ -32,6 +33,7 @@ def parser() -> argparse.ArgumentParser:
     field.add_argument(
         "--frames", metavar="F", type=int, default=101, help="number of frames, equally spaced in time (default: 101)"
     )
+    command_line.add_loads(field)
     command_line.add_saving(field)
     field.set_defaults(run=run_solve)
     discs = commands.add_parser(
@@ -57,6 +59,7 @@ def _scene(options: argparse.Namespace) -> Scene:
 def run_solve(options: argparse.Namespace) -> None:
     """The command `solve`."""
     scene = _scene(options)
+    scene = replace(scene, loads=scene.loads + command_line.given_loads(options))
     command_line.clear_way(options, whole=True)
     field = solve(scene, options.tol, options.method, options.n, options.dt, options.frames, not options.quiet)
     if options.save:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from discs.files.safe import check_writable, fresh
 from discs.files.schema import describe
 from discs.files.untrusted import printable
 from discs.integrators import METHODS
+from discs.loads import OnRod
+from discs.loads.tables import load_of_words
 from discs.mechanics import Trajectory
 from discs.problem import Problem
 from discs.running.frames import WANTS
@@ -52,8 +55,22 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--want", metavar="NAME", nargs="+", default=[], help=f"record also {', '.join((*WANTS, *OFFERS))} (default: none)"
     )
+    add_loads(p)
     p.add_argument("--engine", choices=ENGINES, default="compiled", help="compiled kernels, or NumPy and SciPy (default: compiled)")
     add_saving(p)
+
+
+def add_loads(p: argparse.ArgumentParser) -> None:
+    """The option for loads."""
+    p.add_argument(
+        "--load",
+        metavar=("NAME", "KEY=VALUE"),
+        nargs="+",
+        action="append",
+        default=[],
+        help="a load of discs.loads, as --load Torque pattern=0.3 at=0.0 'signal={name=\"sine\", amplitude=1.0, rate=2.0}'; "
+        "may be given several times (default: none)",
+    )
 
 
 def add_saving(p: argparse.ArgumentParser) -> None:
@@ -85,6 +102,7 @@ def add_file_commands(commands: "argparse._SubParsersAction[argparse.ArgumentPar
 
 def run_discs(problem: Problem, options: argparse.Namespace) -> None:
     """Run a problem with the given options and print a summary."""
+    problem = replace(problem, loads=problem.loads + given_loads(options))
     clear_way(options, whole=False)
     run = simulate(
         problem,
@@ -100,6 +118,11 @@ def run_discs(problem: Problem, options: argparse.Namespace) -> None:
     print(summary(run))
     if options.save:
         print(f"written to {options.save}")
+
+
+def given_loads(options: argparse.Namespace) -> tuple[OnRod, ...]:
+    """The loads that the options give."""
+    return tuple(load_of_words(words) for words in options.load)
 
 
 def clear_way(options: argparse.Namespace, whole: bool) -> None:
@@ -163,7 +186,8 @@ def about(path: str | Path) -> str:
         told = [_told(name, value) for name, value in run.stats["scene"].items()]
     elif run.problem is not None:
         numbers, arrays = describe(run.problem)
-        told = [f"{name} = {value}" for name, value in numbers.items() if value is not None]
+        told = [f"{name} = {value}" for name, value in numbers.items() if value is not None and name != "loads"]
+        told += [printable(load) for load in run.problem.loads]
         told += [f"{name}: {value.size} numbers, {value.min():.6g} to {value.max():.6g}" for name, value in arrays.items()]
     with FrameFile.open(path) as file:
         made = ", ".join(f"{printable(name)} {printable(value)}" for name, value in file.attrs["versions"].items())

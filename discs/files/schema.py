@@ -12,6 +12,7 @@ import numpy as np
 from discs import checks
 from discs.arrays import Float
 from discs.chains.chain import Chain, SteeredChain
+from discs.loads.tables import load_of, table_of
 from discs.problem import Problem, State
 from discs.running.stats import Stats
 
@@ -95,26 +96,29 @@ class Header(NamedTuple):
 def describe(problem: Problem) -> tuple[dict[str, Any], dict[str, Float]]:
     """A problem as numbers and text, and as arrays, by the names of `PARAMETERS`, where values differ between discs."""
     chain, initial = problem.chain, problem.initial
-    if problem.loads:
-        raise ValueError("a run with loads cannot be written to a file: files do not hold loads")
     given = {f.name: getattr(chain, f.name) for f in fields(chain)}
     given |= {f"initial_{f.name}": getattr(initial, f.name) for f in fields(initial)}
     arrays = {name: value for name, value in given.items() if isinstance(value, np.ndarray)}
     equal = {name: float(value[0]) for name, value in arrays.items() if (value.view(np.int64) == value.view(np.int64)[0]).all()}
     told = {name: value for name, value in given.items() if name not in arrays} | equal
     told = {"chain": type(chain).__name__, **told, "duration": problem.duration}
+    if problem.loads:
+        told["loads"] = [table_of(load) for load in problem.loads]
     return told, {name: value for name, value in arrays.items() if name not in equal}
 
 
 def rebuild(told: dict[str, Any], arrays: dict[str, Float]) -> Problem:
     """The problem that `describe` described; ValueError if the data do not make one."""
     given = told | arrays
+    loads = given.pop("loads", [])
+    if not isinstance(loads, list):
+        raise ValueError(f"loads are a list of tables; got {checks.shown(loads)}")
     kind = CHAINS[checks.choice("chain", given.pop("chain", None), CHAINS)]
     duration, n = given.pop("duration", None), checks.whole("n", given.get("n"), 1)
     state: dict[str, Any] = {name.removeprefix("initial_"): given.pop(name) for name in INITIAL if name in given}
     chain = kind(**given)
     full: dict[str, Any] = {name: None if value is None else np.broadcast_to(value, n) for name, value in state.items()}
-    return Problem(chain, State(**full), duration)
+    return Problem(chain, State(**full), duration, tuple(load_of(load) for load in loads))
 
 
 def versions() -> dict[str, str]:

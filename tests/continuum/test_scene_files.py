@@ -90,7 +90,7 @@ def test_loads_in_a_file_are_those_of_the_discs(tmp_path):
     ("content", "message"),
     [
         ('load = "Push"', "load must be one of 'Torque', 'Force'.*; got 'Push'"),
-        ("pattern = 1.0", r"a table \[\[loads\]\] must name its load"),
+        ("pattern = 1.0", "the table of a load must name it"),
         ('load = "Torque"', "Torque needs pattern"),
         ('load = "Torque"\npattern = 1.0\nsize = 2', "key of Torque must be one of .*; got 'size'"),
         ('load = "Torque"\npattern = 1.0\nsignal = "sine"', "signal must be a table with its name"),
