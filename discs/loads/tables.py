@@ -48,7 +48,7 @@ def table_of(load: Any) -> dict[str, Any]:
     found: dict[str, Any] = {"load": kind.__name__}
     for f in fields(kind):
         value = getattr(load, f.name)
-        if isinstance(value, tuple(signals.NAMES.values())):
+        if type(value) in signals.NAMES.values():
             found[f.name] = {"name": type(value).__name__} | {g.name: _plain(getattr(value, g.name)) for g in fields(value)}
         elif callable(value):
             cure = "a signal of discs.loads.signals, such as a table" if f.name in ("signal", "rate") else "numbers for the discs"
