@@ -10,6 +10,7 @@ from scipy.integrate import solve_bvp, solve_ivp
 from compare import convergence, lump
 from continuum import Rod, Scene, SteeredRod, breathing_ring, free_rod, rolling_rod, solve, steered_rod, untwisting_rod
 from continuum import exact as motions
+from continuum.__main__ import main
 from continuum.balance import balances
 from continuum.dispersion import frequency, growth, steered_frequencies
 from continuum.elements import Elements
@@ -254,10 +255,12 @@ def test_parameters_are_taken_at_discs_links_and_bends():
 
 @pytest.mark.parametrize(("kind", "ends"), [("field rod", "consistent"), ("unit ring", "springs")])
 def test_midpoint_keeps_the_energy_to_rounding(kind, ends):
-    run = simulate(lump(scene(kind, 5.0 if "rod" in kind else 1.0), 33, ends), "midpoint", dt=0.002, frames=11, progress=False)
+    problem = lump(scene(kind, 2.0 if "rod" in kind else 1.0), 17, ends)
+    run = simulate(problem, "midpoint", dt=0.005, frames=11, progress=False, engine="plain")
     assert np.abs(run.energy / run.energy[0] - 1).max() < 1e-12
 
 
+@pytest.mark.slow  # kernels of chains
 @pytest.mark.parametrize(
     ("kind", "ends", "least", "most"),
     [
@@ -265,7 +268,7 @@ def test_midpoint_keeps_the_energy_to_rounding(kind, ends):
         ("unit rod", "consistent", 1.9, 2.15),
         ("field ring", "springs", 1.95, 2.05),
         ("unit ring", "springs", 1.95, 2.05),
-        pytest.param("steered", "springs", 1.85, 2.15, marks=pytest.mark.slow),
+        ("steered", "springs", 1.85, 2.15),
     ],
 )
 def test_discs_tend_to_the_field(kind, ends, least, most):
@@ -305,6 +308,7 @@ def bump(width, place=2.13):
     return lambda s: np.exp(-(((s - place) / width) ** 2))
 
 
+@pytest.mark.slow  # kernels of chains
 def test_a_narrow_part_of_the_rod_is_seen():
     """Sixteen times the mass on a piece of length/100, between the places of 33 discs and of 27 functions."""
     given = untwisting_rod(duration=1.0, density=lambda s: 1 + 15 * bump(0.02)(s))
@@ -418,7 +422,7 @@ ROD = Rod(length=LENGTH, **VARYING)
         lambda: motions.rolling_line(ROD, 1.0, 1.0, 1.0),
         lambda: motions.standing_wave(ROD, 1.0, 1.0, 1, 1e-3),
         lambda: motions.growing_wave(ROD, 1.0, 1.0, 1.0, 1, 1e-3),
-        lambda: balances(ROD, simulate(lump(untwisting_rod(duration=0.1), 9), dt=0.01, progress=False), "field"),
+        lambda: balances(ROD, simulate(lump(untwisting_rod(duration=0.1), 9), dt=0.01, progress=False, engine="plain"), "field"),
         lambda: free_rod(ROD, lambda s: (s, 0 * s), lambda s: (0 * s, 0 * s), 0.0, 0.0, 1.0, 9, 0.1),
     ],
 )
@@ -460,15 +464,14 @@ def test_numpy_polynomials_and_other_objects_are_functions():
 
 def test_runs_of_rods_that_vary_are_saved(tmp_path, capsys):
     given = untwisting_rod(duration=0.2, bending_stiffness=polynomial([0.7, 0.1]))
-    field, run = solve(given, 1e-3, frames=2, progress=False), simulate(lump(given, 9), dt=0.01, progress=False)
+    field = solve(given, 1e-3, frames=2, progress=False)
+    run = simulate(lump(given, 9), "midpoint", dt=0.01, progress=False, engine="plain")
     field.save(tmp_path / "field.nc")
     run.save(tmp_path / "run.nc")
     values = load(tmp_path / "field.nc").stats["scene"]["bending_stiffness"]
     np.testing.assert_allclose(values, np.linspace(0.7, 1.1, 33))
     again = load(tmp_path / "run.nc").problem
     np.testing.assert_array_equal(again.chain.bending_stiffness, lump(given, 9).chain.bending_stiffness)
-    from continuum.__main__ import main
-
     assert main(["info", str(tmp_path / "field.nc")]) == 0
     told = capsys.readouterr().out
     assert "bending_stiffness: varies along the rod, 0.7 to 1.1" in told
