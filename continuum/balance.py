@@ -22,6 +22,10 @@ r x n' = (r x n)' - r' x n with r' x n = -(K r' x r'')', and, with tension, p r'
 to a common sign. Its angular momentum is printed with -K(x''y' + y''x'), where -K(x''y' - y''x') follows. The law of
 material_momentum belongs to the symmetry s -> s + const. It is not in the paper, but holds for the free rod, which is homogeneous.
 
+**Parameters that vary** along the rolling rod stand inside the derivatives, n = -(K r'')' and (beta theta')' in the equations and
+r'.(K r'')' in the flux of material_momentum. s -> s + const is no symmetry then, and the source of material_momentum has minus the
+derivative of the Lagrangian's density by s itself, (K' |r''|^2 + beta' theta'^2 - rho' |r.|^2 - alpha' theta.^2)/2, too.
+
 **Noether's condition** (NHnoether): a symmetry gives a conservation law of the rolling rod if its generator, contracted with the
 forms of the bundle (bundleF), is zero on the constraint, that is, if Q_r - e Q_theta = 0. For the symmetry in time this is the
 rolling constraint itself. For the other symmetries it fails: their laws are balances with a source, the nonholonomic momentum
@@ -70,7 +74,7 @@ def balances(
 
     Parameters
     ----------
-    rod : a rod with linear curvature.
+    rod : a rod with linear curvature; the free rod is uniform.
     run : the motion, from `solve`, `simulate` or `free_rod`, with at least 8 nodes and 3 frames. The frames must be close together:
         the error of d_t is of second order in their distance.
     rolling : the law of rolling, a name in `discs.chains.rolling` such as "field" or "unit"; None for the free rod.
@@ -107,9 +111,14 @@ def balances(
     chord = advance * run.s  # r - chord is periodic
     r1, r2, r3, r4 = (along(r - chord, order) for order in (1, 2, 3, 4))
     r1 += advance
-    same = rod.uniform("balances")
-    rho, alpha, beta, bend, radius = same.density, same.spin_inertia, same.torsion_stiffness, same.bending_stiffness, same.radius
+    there = rod.at(run.s)
+    rho, alpha, radius = there.density, there.spin_inertia, there.radius
+    beta, bend = there.torsion_stiffness, there.bending_stiffness
+    rho1, alpha1, beta1, bend1 = (along(c) if c.ndim else 0.0 for c in (rho, alpha, beta, bend))
+    bend2 = along(bend, 2) if bend.ndim else 0.0
+    moment1, moment2 = bend * r3 + bend1 * r2, bend * r4 + 2 * bend1 * r3 + bend2 * r2  # (K r'')', (K r'')''
     if rolling is None:
+        rod.uniform("balances of the free rod")
         if run.x_rate is None or run.y_rate is None or run.tension is None:
             raise ValueError("rolling=None needs a motion of the free rod, with x_rate, y_rate and tension")
         v, p = np.stack([run.x_rate, run.y_rate]), _at_nodes(run.s, run.tension, period)
@@ -119,11 +128,12 @@ def balances(
         e, p = law.arm(radius, r1) * _turned(r1), np.zeros_like(omega)
         v = e * omega
         e_rate = radius * _turned(law.rate(r1, along(v)))
-        torque = beta * along(run.theta, 2) - bend * _dot(e, r4) - rho * omega * _dot(e, e_rate)
-        force = rho * (e * torque / (alpha + rho * _dot(e, e)) + e_rate * omega) + bend * r4
-    n = p * r1 - bend * r3
+        torque = beta * along(run.theta, 2) + beta1 * theta1 - _dot(e, moment2) - rho * omega * _dot(e, e_rate)
+        force = rho * (e * torque / (alpha + rho * _dot(e, e)) + e_rate * omega) + moment2
+    n = p * r1 - moment1
     kinetic, elastic = rho * _dot(v, v) + alpha * omega**2, bend * _dot(r2, r2) + beta * theta1**2
     energy, material = 0.5 * (kinetic + elastic), rho * _dot(v, r1) + alpha * omega * theta1
+    uneven = 0.5 * (bend1 * _dot(r2, r2) + beta1 * theta1**2 - rho1 * _dot(v, v) - alpha1 * omega**2)
     ones, none = np.ones_like(omega), np.zeros_like(omega)
     laws = {
         "energy": (in_time(r), in_time(run.theta), energy, -(_dot(n, v) + bend * _dot(r2, along(v)) + beta * theta1 * omega)),
@@ -131,12 +141,12 @@ def balances(
         "momentum_y": ((none, ones), none, rho * v[1], -n[1]),
         "theta_momentum": ((none, none), ones, alpha * omega, -beta * theta1),
         "angular_momentum": (_turned(r), none, rho * _cross(r, v), -_cross(r, n) - bend * _cross(r1, r2)),
-        "material_momentum": (r1, theta1, material, bend * _dot(r1, r3) - p - energy),
+        "material_momentum": (r1, theta1, material, _dot(r1, moment1) - p - energy),
     }
     found = {}
     for name, (move, turn, density, flux) in laws.items():
         slip = np.zeros_like(r) if rolling is None else np.asarray(move) - e * turn
-        source = _dot(force, slip)
+        source = _dot(force, slip) + (uneven if name == "material_momentum" else 0.0)
         if name == "angular_momentum" and closed:  # r x n is not periodic if r advances
             flux_s = along(flux + _cross(chord, n)) - _cross(advance, n) - _cross(chord, along(n))
         else:

@@ -11,7 +11,6 @@ from compare import convergence, lump
 from continuum import Rod, Scene, SteeredRod, breathing_ring, free_rod, rolling_rod, solve, steered_rod, untwisting_rod
 from continuum import exact as motions
 from continuum.__main__ import main
-from continuum.balance import balances
 from continuum.dispersion import frequency, growth, steered_frequencies
 from continuum.elements import Elements
 from continuum.galerkin import SpectralRod
@@ -422,7 +421,6 @@ ROD = Rod(length=LENGTH, **VARYING)
         lambda: motions.rolling_line(ROD, 1.0, 1.0, 1.0),
         lambda: motions.standing_wave(ROD, 1.0, 1.0, 1, 1e-3),
         lambda: motions.growing_wave(ROD, 1.0, 1.0, 1.0, 1, 1e-3),
-        lambda: balances(ROD, simulate(lump(untwisting_rod(duration=0.1), 9), dt=0.01, progress=False, engine="plain"), "field"),
         lambda: free_rod(ROD, lambda s: (s, 0 * s), lambda s: (0 * s, 0 * s), 0.0, 0.0, 1.0, 9, 0.1),
     ],
 )
