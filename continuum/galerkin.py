@@ -34,7 +34,7 @@ fitted by least squares in s. omega at a node is the mean of the initial omega w
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -293,5 +293,5 @@ class SpectralRod(SkewGradient):
         values, vectors = np.linalg.eigh(stiffness)
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 
-    def solve(self, secant: Float, c: Basis, g: complex, rhs: Float, d: complex = 0.0) -> Float:
+    def solve(self, secant: Float, c: Basis, g: complex, rhs: Float, d: complex = 0.0, t: float = 0.0, q: Any = None) -> Float:
         return self.modes(c).solve(d, g, rhs)

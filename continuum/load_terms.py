@@ -11,7 +11,7 @@ from continuum.rod import Scene
 from discs import checks
 from discs.arrays import Float
 from discs.loads import Damping, Force, OnRod, Rest, Slope, Spring, Torque
-from discs.loads.binding import signal_of
+from discs.loads.binding import given, signal_of
 from discs.loads.signals import Signal
 
 X, Y, ROLL, TWIST = range(4)  # what a force acts on: x, y, theta, theta'
@@ -86,18 +86,20 @@ def add(load: Any, to: Terms) -> None:
 
 
 def check_taken(loads: tuple[OnRod, ...]) -> None:
-    """ValueError for a load that has no form."""
+    """ValueError for a load that has no form, or a part without one."""
     for load in loads:
-        if add.dispatch(type(load)) is add.dispatch(object):
+        name = type(load).__name__
+        parts = [part for part in ("curvature", "bending") if given(getattr(load, part, 0.0))]
+        if parts or add.dispatch(type(load)) is add.dispatch(object):
+            what = f"{name}({parts[0]}=...)" if parts else name
             raise ValueError(
-                f"{type(load).__name__}: the spectral solver has no form of it; take method='richardson', or "
-                "simulate(lump(scene, n))"
+                f"{what}: the spectral solver has no form of it; take method='richardson', or simulate(lump(scene, n))"
             )
 
 
 def _refuse_headings(load: OnRod, *names: str) -> None:
     for name in names:
-        if callable(given := getattr(load, name)) or (given is not None and np.any(given)):
+        if given(getattr(load, name)):
             raise ValueError(f"{type(load).__name__}: {name} is for rods with headings of their own; here they follow the line")
 
 
@@ -131,14 +133,14 @@ def _(load: Spring, to: Terms) -> None:
 
 @add.register
 def _(load: Damping, to: Terms) -> None:
-    _refuse_headings(load, "turning", "bending")
+    _refuse_headings(load, "turning")
     for row, name in enumerate(("rolling", "torsion")):
         to.damping[row] += to.w * to.at(load, name, least=0.0)
 
 
 @add.register
 def _(load: Rest, to: Terms) -> None:
-    _refuse_headings(load, "curvature", "stretch", "shear", "mounting_angle")
+    _refuse_headings(load, "stretch", "shear", "mounting_angle")
     root = np.sqrt(to.scene.rod.at(to.s).torsion_stiffness * to.w)
     strain = root * to.at(load, "twist")
     if load.signal is None:

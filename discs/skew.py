@@ -68,7 +68,8 @@ class Load(ABC):
     viscosity : (columns, n + 1), of the part -B^T (viscosity) B v of f in the rows from theta on, where B v is the difference of
         neighbours. Link j is before disc j; on a ring links 0 and n are the same, at free ends they have 0. None for none.
     axles : driven angles, of motors; see `discs.loads.motor`.
-    section : (2, n_links), rest stretch and shear of links of discs with their own headings, which become part of V; None for none.
+    section : rest strains that become part of V: (2, n_links), stretch and shear of links of discs with their own headings, or
+        (n_bends,), the curvature of chains with the true curvature. None for none.
     conservative : whether f = -grad U with U = `potential`; then the energy, U included, is conserved.
     least : a lower bound of U, used to detect blow-up; -inf if none is known.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
@@ -97,6 +98,10 @@ class Load(ABC):
     @abstractmethod
     def force(self, t: float, q: Float, v: Float) -> Float:
         """f, (rows, n), at the time t, positions q (rows, n) and velocities v (rows, n)."""
+
+    def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
+        """Upper bands of d C^T D C + g C^T S C, for the rest of D = -df/dv and S = -df/dq (`discs.loads.bends`); None for none."""
+        return None
 
     def applied(self, t: float, q: Float, v: Float) -> Float:
         """f without what motors do."""
@@ -162,10 +167,10 @@ class SkewGradient(ABC):
         """The discrete gradient of V over the step, (rows, n); grad V if the step is zero."""
 
     @abstractmethod
-    def solve(self, secant: Secant, c: Basis, g: complex, rhs: Float, d: complex = 0.0) -> Float:
+    def solve(self, secant: Secant, c: Basis, g: complex, rhs: Float, d: complex = 0.0, t: float = 0.0, q: Any = None) -> Float:
         """Solve (I + d C^T D C + g C^T S C) p = rhs for p, of the shape of pi.
 
-        S is B^T (stiffness) B plus the load's stiffness; D is the load's damping.
+        S is B^T (stiffness) B plus the load's stiffness; D is the load's damping, both at the time t and positions q.
         """
 
     @final

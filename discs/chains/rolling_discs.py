@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
@@ -113,7 +114,7 @@ class RollingDiscs(SkewGradient):
     def _inverse_order(self) -> Int | None:
         return None if self.order is None else np.argsort(self.order)
 
-    def solve(self, secant: Secant, c: Float, g: complex, rhs: Float, d: complex = 0.0) -> Float:
+    def solve(self, secant: Secant, c: Float, g: complex, rhs: Float, d: complex = 0.0, t: float = 0.0, q: Any = None) -> Float:
         """In O(n): for g > 0 by banded Cholesky, for a complex g, or with loads in steps back in time, by banded elimination.
 
         Compositions have steps back in time, d < 0. Their matrix is not positive definite if dampers are stiff, or hold a disc.
@@ -127,9 +128,9 @@ class RollingDiscs(SkewGradient):
             matrix = matrix.astype(np.result_type(matrix, guide))
             matrix[-1] += guide if self.order is None else guide[self.order]
             if self.load.viscosity is not None:
-                viscous = d * self._viscous(self.load.viscosity, c)
-                matrix = matrix.astype(np.result_type(matrix, viscous))
-                matrix[-len(viscous) :] += viscous
+                matrix = _sum(matrix, d * self._viscous(self.load.viscosity, c))
+            if (bands := self.load.bands(t, q, c, d, g)) is not None:
+                matrix = _sum(matrix, bands)
         rhs = rhs.astype(matrix.dtype)
         flat = rhs.ravel() if self.order is None else rhs.ravel()[self.order]
         if np.iscomplexobj(matrix) or (self.load is not None and d.real < 0):
@@ -162,6 +163,14 @@ class RollingDiscs(SkewGradient):
         place = np.arange(self.n) if self._inverse_order is None else self._inverse_order
         pairs = np.stack([first, (first + 1) % self.n], axis=1)
         return Assembly(*(place[pairs + column * self.n] for column in range(len(self.rows) - 2)))
+
+
+def _sum(a: Any, b: Any) -> Any:
+    """The sum of two matrices in upper bands, the diagonals last."""
+    wide, narrow = (a, b) if len(a) >= len(b) else (b, a)
+    found = np.array(wide, np.result_type(a, b), order="F")
+    found[-len(narrow) :] += narrow
+    return found
 
 
 class Assembly:

@@ -37,7 +37,8 @@ class SlavedSystem(RollingDiscs):
         self.load = load
         self.closed, self.reach = ends == "ring", 3 if ends == "consistent" else 2
         self.scale = np.array([chain.length, chain.length, 1.0])
-        self._law, self._springs = chain.rolling_law, chain.link_law(chain)
+        rest = () if load is None or load.section is None else (load.section,)
+        self._law, self._springs = chain.rolling_law, chain.link_law(chain, *rest)
         self.quadratic = self._springs.quadratic
         self._shift = np.array([*chain.shift, 0.0])
         self.vanishing = self._law.vanishing

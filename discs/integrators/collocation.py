@@ -160,10 +160,13 @@ def _begin(chain: Any, work: Any, method: Collocation, room: Room, before: Phase
     renew(c, before.pi, 0.5 * h, move, chain.scale, own.change)
     do.basis(chain, work, move, c)
     do.stiffness(chain, work, move, c, stiff)
+    t = room.times[rule.b.size // 2]
     for j in range(rule.real.size):
-        do.precondition(chain, stiff, c, h * rule.real[j], h * h * rule.real[j] ** 2, do.pick(chain, own.single, j))
+        d = h * rule.real[j]
+        do.precondition(chain, stiff, before, t, move, c, d, d * d, do.pick(chain, own.single, j))
     for j in range(rule.pairs.size):
-        do.precondition(chain, stiff, c, h * rule.pairs[j], h * h * rule.pairs[j] ** 2, do.pick(chain, own.double, j))
+        z = h * rule.pairs[j]
+        do.precondition(chain, stiff, before, t, move, c, z, z * z, do.pick(chain, own.double, j))
     for i in range(rule.b.size):
         forward(c, before.pi, room.v[i])
 
@@ -234,7 +237,7 @@ def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Ph
         moved = do.moved(chain, method, room, sweep, h)
         sweep += 1
     for i in range(s):
-        do.spend(chain, times[i], h * rule.b[i], v[i], 1.0)
+        do.spend(chain, before, times[i], h * rule.b[i], moves[i], v[i], 1.0)
     move = moves[0]
     combine(rule.b, v, h, move)
     advance(before, move, 1.0, after)

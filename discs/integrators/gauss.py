@@ -36,17 +36,18 @@ class Guide(ABC):
 class Common(Guide):
     """C in the middle of the step, extrapolated with the velocity at its start."""
 
-    def __init__(self, system: SkewGradient, z: Phase, h: float) -> None:
+    def __init__(self, system: SkewGradient, z: Phase, t: float, h: float, rule: Tableau) -> None:
         self._system, self._h = system, h
         shape = system.shape(z.hi, z.lo)
-        middle = system.moved(shape, 0.5 * h * system.forward(system.basis(shape), z.pi))
+        move = 0.5 * h * system.forward(system.basis(shape), z.pi)
+        middle, self._middle = system.moved(shape, move), (t + rule.nodes[rule.b.size // 2] * h, z.hi + move)
         self._c, self._secant = system.basis(middle), system.secant(middle, np.zeros_like(z.hi))
 
     def rates(self, p: Float) -> Float:
         return np.array([self._system.forward(self._c, stage) for stage in p])
 
     def solve(self, value: complex, rest: Float) -> Float:
-        return self._system.solve(self._secant, self._c, self._h * self._h * value**2, rest, self._h * value)
+        return self._system.solve(self._secant, self._c, self._h * self._h * value**2, rest, self._h * value, *self._middle)
 
     def moved(self, change: Float, before: Float, v: Float, p: Float) -> tuple[float, Float, Float]:
         far = np.abs([0.5 * self._h * self._system.forward(self._c, stage) for stage in change]).max(axis=(0, 2))
@@ -119,7 +120,7 @@ class Gauss(OneStep, ABC):
 
     def step(self, system: SkewGradient, z: Phase, t: float, h: float, work: Work) -> Phase:
         rule = tableau(self.stages)
-        after, v, p, sweep = collocate(system, z, t, h, rule, Common(system, z, h), self.sweeps, self.tolerance)
+        after, v, p, sweep = collocate(system, z, t, h, rule, Common(system, z, t, h, rule), self.sweeps, self.tolerance)
         for node, b, move, rate in zip(rule.nodes, rule.b, h * _mix(rule.a, v), v, strict=True):
             work.spend(system.load, t + node * h, b * h, z, move, rate)
         if system.load is not None and system.load.axles:

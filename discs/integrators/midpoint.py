@@ -79,7 +79,8 @@ class Midpoint(OneStep):
             if guide is None or system.quadratic:
                 guide = secant, c
             pull = system.pull(c, system.mean_force(secant), t + 0.5 * h, z, 0.5 * h * velocity, p)
-            change = system.solve(*guide, 0.25 * h * h, z.pi - p - 0.5 * h * pull, 0.5 * h)
+            middle = z.hi + 0.5 * h * velocity
+            change = system.solve(*guide, 0.25 * h * h, z.pi - p - 0.5 * h * pull, 0.5 * h, t + 0.5 * h, middle)
             p = p + change
             last, move = move, 0.5 * h * system.forward(c, p)
             if (np.abs(move - last).max(axis=1) <= self.tolerance * system.scale).all():
@@ -144,7 +145,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
                 return CUT
             change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
             sweep += 1
-        do.spend(chain, time + 0.5 * tau, tau, move, 2 / tau)
+        do.spend(chain, now, time + 0.5 * tau, tau, move, move, 2 / tau)
         time += tau
         solves += sweep
         unconverged = max(unconverged, stuck(method, sweep))

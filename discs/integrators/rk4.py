@@ -84,7 +84,7 @@ def _step(method: Explicit, chain: Parameters, work: Any, room: Room, before: Ph
         do.basis(chain, work, move, c)
         forward(c, p, v)
         do.pullback(chain, work, before, t + nodes[i] * h, move, c, p, g)
-        do.spend(chain, t + nodes[i] * h, weights[i] * h / 6, v, 1.0)
+        do.spend(chain, before, t + nodes[i] * h, weights[i] * h / 6, move, v, 1.0)
         for row in range(v.shape[0]):
             rate, so_far, to = v[row], total[row], move[row]
             for k in range(rate.size):

@@ -10,17 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
+from discs.kernels.bends import NO_BENDS, Bends, bend, spent_by_bends, stiffen_bends
 from discs.kernels.compiled import fill, part
 from discs.kernels.shared import column
 
 
 class Linear(NamedTuple):
-    """f = constant - damping v - stiffness q - B^T (viscosity) B v + sum_k (signal k) (pattern k); arrays without entries for none.
+    """f = constant - damping v - stiffness q - B^T (viscosity) B v + sum_k (signal k) (pattern k), and that of bends.
+
+    Arrays have no entries for none.
 
     constant, damping, stiffness : (rows, n). viscosity : (columns, n + 1), of the rates of theta and phi, link j before disc j; B v
     is the difference of neighbours. patterns : (K, rows, n). times : (M,), increasing. values : (M, K), signals at these times.
-    near : (1,), how far a time may be from one of them. spent : (4,), work and dissipated energy since the last call from Python,
-    each with its lost digits.
+    near : (1,), how far a time may be from one of them. bends : see `discs.kernels.bends`. spent : (4,), work and dissipated energy
+    since the last call from Python, each with its lost digits.
     """
 
     constant: NDArray
@@ -31,11 +34,12 @@ class Linear(NamedTuple):
     times: NDArray
     values: NDArray
     near: NDArray
+    bends: Bends
     spent: NDArray
 
 
 NONE = np.empty((0, 0))
-UNLOADED = Linear(NONE, NONE, NONE, NONE, np.empty((0, 0, 0)), np.empty(0), NONE, np.empty(0), np.empty(0))
+UNLOADED = Linear(NONE, NONE, NONE, NONE, np.empty((0, 0, 0)), np.empty(0), NONE, np.empty(0), NO_BENDS, np.empty(0))
 
 
 @fill(do.loaded, Linear)
@@ -78,8 +82,10 @@ def _push(load, state, t, move, c, p, factor, g):
                 to[k] -= factor * a[k] * f
             if j > 0:
                 to[i] += factor * a[i] * f
+    place = at(load, t)
+    if load.bends.rest.size > 0:
+        bend(load.bends, load.values, place, state, move, c, p, factor, g)
     if load.patterns.shape[0] > 0:
-        place = at(load, t)
         for k in range(load.patterns.shape[0]):
             signal = factor * load.values[place, k] if place >= 0 else np.nan
             for row in range(c.shape[0]):
@@ -104,6 +110,12 @@ def _guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
             beside[i] -= d * links[i + 1] * a[i] * a[i + 1 if i < last else 0]
 
 
+@fill(do.stiffen, Linear)
+def _stiffen(load, state, t, move, c, d, g, matrix):
+    if load.bends.rest.size > 0:
+        stiffen_bends(load.bends, load.values, at(load, t), state, move, c, d, g, matrix)
+
+
 @part
 def book(spent, at, amount):
     """Add an amount to the sum spent[at], whose lost digits are in spent[at + 1] (Knuth's two-sum)."""
@@ -115,10 +127,11 @@ def book(spent, at, amount):
 
 
 @fill(do.spend, Linear)
-def _spend(load, t, weight, v, scale):
+def _spend(load, state, t, weight, move, v, scale):
     if load.spent.size == 0:
         return
-    work, dissipated = 0.0, 0.0
+    place = at(load, t)
+    work, dissipated = spent_by_bends(load.bends, load.values, place, state, move, v)
     for row in range(load.damping.shape[0]):
         rate, damping = v[row], load.damping[row]
         for i in range(rate.size):
@@ -129,7 +142,6 @@ def _spend(load, t, weight, v, scale):
             apart = rate[j if j < rate.size else 0] - rate[j - 1]
             dissipated += links[j] * apart * apart
     if load.patterns.shape[0] > 0:
-        place = at(load, t)
         for k in range(load.patterns.shape[0]):
             signal = load.values[place, k] if place >= 0 else np.nan
             for row in range(v.shape[0]):

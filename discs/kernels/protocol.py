@@ -57,8 +57,9 @@ def stiffness(chain, work, move, c, matrix):
 
 
 @stub
-def precondition(chain, stiff, c, d, g, matrix):
-    """matrix = factors of I + d C^T D C + g C^T (grad^2 V) C. `stiff` is the result of `stiffness`, D the damping of the load."""
+def precondition(chain, stiff, state, t, move, c, d, g, matrix):
+    """matrix = factors of I + d C^T D C + g C^T (grad^2 V) C. `stiff` is the result of `stiffness`, D the damping of the load, at
+    the time t after a move from the positions of `state`."""
 
 
 @stub
@@ -126,8 +127,9 @@ def moved(chain, method, room, sweep, h):
 
 
 @stub
-def spend(chain, t, weight, v, scale):
-    """Book the work of the loads of a chain, and what they dissipate, in a time `weight` around t at the velocities `scale` v.
+def spend(chain, state, t, weight, move, v, scale):
+    """Book the work of the loads of a chain, and what they dissipate, in a time `weight` around t, after a move from the positions
+    of `state`, at the velocities `scale` v.
 
     Also for a load, `chain.load`; nothing for chains without loads.
     """
@@ -238,3 +240,8 @@ def guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
 
     roll, turn : (n,), the diagonal. roll_beside, turn_beside : (n,), entries of a disc and the next one.
     """
+
+
+@stub
+def stiffen(load, state, t, move, c, d, g, matrix):
+    """Add d C^T D C + g C^T S C, for what else the load has of D and S, to a matrix of `discs.kernels.slaved_matrix`."""

@@ -186,5 +186,10 @@ def _forces(chain, work, state, t, moves, c, p, g):
 
 
 @fill(do.spend, object)
-def _spend(chain, t, weight, v, scale):
+def _spend(chain, state, t, weight, move, v, scale):
+    pass
+
+
+@fill(do.stiffen, object)
+def _stiffen(load, state, t, move, c, d, g, matrix):
     pass

@@ -184,6 +184,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
         forward(c, p, work.step, half)
         do.push(chain.load, state, t + half, work.step, c, p, half, work.rhs)
     do.guide(chain.load, c, half, half * half, m.a, m.u, m.a, m.u)
+    do.stiffen(chain.load, state, t + half, work.step, c, half, half * half, m)
     factor(chain, m)
     solve(chain, m, b)
     for i in range(n):
@@ -198,13 +199,14 @@ def _stiffness(chain, work, move, c, matrix):
 
 
 @fill(do.precondition, Slaved)
-def _precondition(chain, stiff, c, d, g, matrix):
+def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
     for i in range(stiff.a.size):
         matrix.a[i] = 1 + g * stiff.a[i]
         matrix.u[i] = g * stiff.u[i]
         matrix.w[i] = g * stiff.w[i]
     matrix.corner[0], matrix.corner[1] = g * stiff.corner[0], g * stiff.corner[1]
     do.guide(chain.load, c, d, g, matrix.a, matrix.u, matrix.a, matrix.u)
+    do.stiffen(chain.load, state, t, move, c, d, g, matrix)
     factor(chain, matrix)
 
 
@@ -219,8 +221,8 @@ def _potential(chain, work):
 
 
 @fill(do.spend, Slaved)
-def _spend(chain, t, weight, v, scale):
-    do.spend(chain.load, t, weight, v, scale)
+def _spend(chain, state, t, weight, move, v, scale):
+    do.spend(chain.load, state, t, weight, move, v, scale)
 
 
 @fill(do.vanishing, Slaved)

@@ -196,7 +196,7 @@ def _stiffness(chain, work, move, c, matrix):
 
 
 @fill(do.precondition, Steered)
-def _precondition(chain, stiff, c, d, g, matrix):
+def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
     n = stiff.d.shape[1]
     for i in range(n):
         matrix.d[0, i], matrix.d[1, i], matrix.d[2, i] = 1 + g * stiff.d[0, i], g * stiff.d[1, i], 1 + g * stiff.d[2, i]
@@ -222,8 +222,8 @@ def _potential(chain, work):
 
 
 @fill(do.spend, Steered)
-def _spend(chain, t, weight, v, scale):
-    do.spend(chain.load, t, weight, v, scale)
+def _spend(chain, state, t, weight, move, v, scale):
+    do.spend(chain.load, state, t, weight, move, v, scale)
 
 
 @fill(do.vanishing, Steered)

@@ -74,6 +74,11 @@ class OnRod(ABC):
         return Linear(drives=(Drive(spread(chain, rows), signal_of(self._name, signal), self._name),))
 
 
+def given(pattern: Pattern) -> bool:
+    """Whether a pattern is not zero."""
+    return callable(pattern) or bool(np.any(pattern))
+
+
 def spread(chain: Discs, rows: Mapping[int, ArrayLike]) -> Float:
     """An array (rows, n) with some of its rows."""
     found = np.zeros((4 if isinstance(chain, SteeredChain) else 3, chain.n))

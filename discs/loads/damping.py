@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from discs.chains.chain import SteeredChain
-from discs.loads.binding import Discs, OnRod, Pattern, spread
+from discs.loads.bends import bends_of
+from discs.loads.binding import Discs, OnRod, Pattern, given, spread
 from discs.loads.linear import Linear
 
 
@@ -16,13 +17,15 @@ class Damping(OnRod):
         sum w (rolling omega^2 + turning phi.^2) + sum_links k (torsion omega'^2 + bending (phi.')^2)
 
     per time, with differences of neighbours over k for the derivatives by s: Kelvin-Voigt moments beta theta' + torsion omega'.
+    Where headings follow the line, bending dissipates sum_bends w bending kappa.^2 with kappa = J r' . r'', or kappa = phi' with
+    the true curvature (`discs.loads.bends`): a rod that turns without bending dissipates nothing.
 
     Parameters
     ----------
     rolling : torque per rate and length, >= 0; a number, an array (n,) or a function of s.
     turning : the same about the vertical, for discs with their own headings.
     torsion : >= 0, in units of the torsion stiffness times time; a number, an array over the links or a function of s.
-    bending : the same for the bending stiffness, for discs with their own headings.
+    bending : the same for the bending stiffness; where headings follow the line an array is over the bends.
     """
 
     rolling: Pattern = 0.0
@@ -35,12 +38,14 @@ class Damping(OnRod):
         names = ("rolling", "turning")[: 1 + steered]
         rates = [self._sampled(name, getattr(self, name), chain.s, 0.0) * chain.w for name in names]
         links = [self._sampled(name, getattr(self, name), chain.middles, 0.0) for name in ("torsion", "bending")[: 1 + steered]]
-        if not steered:
-            for name in ("turning", "bending"):
-                if callable(given := getattr(self, name)) or np.any(given):
-                    self._needs_headings(chain, name)
+        bends = None
+        if not isinstance(chain, SteeredChain):
+            if given(self.turning):
+                self._needs_headings(chain, "turning")
+            if given(self.bending):
+                bends = bends_of(chain, viscosity=self._sampled("bending", self.bending, chain.bends, 0.0))
         viscosity = np.zeros((len(links), chain.n + 1))
         viscosity[:, 1 : 1 + links[0].size] = np.array(links) / chain.k
         viscosity[:, 0] = viscosity[:, -1]
         damping = spread(chain, dict(enumerate(rates, start=2)))
-        return Linear(damping=damping, viscosity=viscosity if viscosity.any() else None)
+        return Linear(damping=damping, viscosity=viscosity if viscosity.any() else None, bends=bends)

@@ -9,6 +9,7 @@ import numpy as np
 from discs import checks
 from discs.arrays import Float
 from discs.loads import signals
+from discs.loads.bends import Bends
 from discs.loads.signals import Signal
 from discs.skew import Load
 
@@ -20,6 +21,7 @@ class Drive(NamedTuple):
 
     pattern : (rows, n). name : of the load, for messages. strain : None, or a rest strain, see `Linear.strain`; the force then
     comes from the energy of springs. closing : pattern q of a ring lacks this, due to the whole turns of its heading.
+    curvature : None, or (B,), the part signal(t) curvature of the rest curvature of `Linear.bends`.
     """
 
     pattern: Float
@@ -27,6 +29,7 @@ class Drive(NamedTuple):
     name: str
     strain: Float | None = None
     closing: float = 0.0
+    curvature: Float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,7 @@ class Linear(Load):
     strain : rest strains of springs, times the root of their stiffness; any shape.
     drives : the parts that depend on time.
     section : see `Load`; the load then has no compiled form.
+    bends : rest curvature and viscosity of bending of slaved headings, whose force and potential are added; None for none.
     floor : a lower bound of the potential, or of its sum with that of the springs; None for the one where stiffness q = constant.
 
     Raises
@@ -60,6 +64,7 @@ class Linear(Load):
     strain: Any = 0.0
     drives: tuple[Drive, ...] = ()
     section: Any = None
+    bends: Bends | None = None
     floor: float | None = None
 
     def __post_init__(self) -> None:
@@ -81,7 +86,8 @@ class Linear(Load):
                     f"viscosity must be finite, at least 0 and of shape {need}; got {checks.shown(links)}: {links.min():g}"
                 )
             object.__setattr__(self, "viscosity", links)
-        object.__setattr__(self, "conservative", not self.damping.any() and self.viscosity is None and not self.drives)
+        damped = self.damping.any() or self.viscosity is not None or (self.bends is not None and self.bends.viscosity.any())
+        object.__setattr__(self, "conservative", not damped and not self.drives)
         pushed = self.constant != 0
         push, spring = self.constant[pushed], self.stiffness[pushed]
         least = self.offset - 0.5 * float((push**2 / spring).sum()) if spring.all() else -np.inf
@@ -89,6 +95,8 @@ class Linear(Load):
 
     def potential(self, t: float, q: Float) -> float:
         own = self.offset + 0.5 * float(np.sum(self.strain**2)) + float(np.vdot(0.5 * self.stiffness * q - self.constant, q))
+        if self.bends is not None:
+            own += self.bends.potential(self.bends.rest, q)
         return own + self.driven(t, q) if self.drives else own
 
     def driven(self, t: float, q: Float) -> float:
@@ -98,12 +106,22 @@ class Linear(Load):
                 signal = _at(drive, t)
                 strain = strain + signal * drive.strain
                 total -= signal * (float(np.vdot(drive.pattern, q)) + drive.closing)
+        if self.bends is not None:
+            total += self.bends.potential(self._curvature(t), q) - self.bends.potential(self.bends.rest, q)
         return total + 0.5 * float(np.sum(strain**2) - np.sum(self.strain**2))
+
+    def _curvature(self, t: float) -> Any:
+        """The rest curvature at a time, (B,)."""
+        assert self.bends is not None
+        driven = (_at(drive, t) * drive.curvature for drive in self.drives if drive.curvature is not None)
+        return self.bends.rest + sum(driven)
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = self.constant - self.damping * v - self.stiffness * q
         if self.viscosity is not None:
             found[2:] += np.diff(self.viscosity * self._apart(v))
+        if self.bends is not None:
+            found[:2] += self.bends.force(self._curvature(t), q) + self.bends.drag(q, v)
         for drive in self.drives:
             found += _at(drive, t) * drive.pattern
         return found
@@ -113,7 +131,13 @@ class Linear(Load):
         dissipated = float(np.vdot(self.damping * v, v))
         if self.viscosity is not None:
             dissipated += float((self.viscosity * self._apart(v) ** 2)[:, 1:].sum())
+        if self.bends is not None:
+            driven = self.bends.force(self._curvature(t), q) - self.bends.force(self.bends.rest, q)
+            work, dissipated = work + float(np.vdot(driven, v[:2])), dissipated + self.bends.dissipated(q, v)
         return work, dissipated
+
+    def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
+        return None if self.bends is None else self.bends.bands(self._curvature(t), q, c, d, g)
 
     @staticmethod
     def _apart(v: Float) -> Float:
@@ -125,12 +149,18 @@ class Linear(Load):
         if self.section is not None:
             return None
         from discs.kernels import load
+        from discs.kernels.bends import NO_BENDS
 
+        bends = NO_BENDS
+        if self.bends is not None:
+            none = 0 * self.bends.rest
+            driven = [none if drive.curvature is None else drive.curvature for drive in self.drives]
+            bends = self.bends.parameters(np.array(driven).reshape(-1, none.size))
         links = np.empty((0, 0)) if self.viscosity is None else self.viscosity
         patterns = np.array([drive.pattern for drive in self.drives]).reshape(-1, *self.constant.shape)
         none = np.empty((0, len(self.drives)))
         return load.Linear(
-            self.constant, self.damping, self.stiffness, links, patterns, np.empty(0), none, np.empty(1), np.empty(0)
+            self.constant, self.damping, self.stiffness, links, patterns, np.empty(0), none, np.empty(1), bends, np.empty(0)
         )
 
     def timed(self, times: Float, h: float) -> Any:

@@ -102,6 +102,9 @@ class Held(Load):
     def driven(self, t: float, q: Float) -> float:
         return 0.0 if self._other is None else self._other.driven(t, q)
 
+    def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
+        return None if self._other is None else self._other.bands(t, q, c, d, g)
+
     def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
         """Without that of the motors, see `discs.integrators.base.Work.react`."""
         return (0.0, 0.0) if self._other is None else self._other.power(t, q, v)

@@ -1,10 +1,12 @@
 """The sum of several loads."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from discs.arrays import Float
+from discs.loads.bends import Bends
 from discs.loads.linear import Linear
 from discs.loads.motor import Held
 from discs.skew import Load
@@ -12,7 +14,7 @@ from discs.skew import Load
 
 @dataclass(frozen=True, eq=False)
 class Total(Load):
-    """The sum of loads."""
+    """The sum of loads, of which at most one is linear."""
 
     loads: tuple[Load, ...]
 
@@ -33,6 +35,9 @@ class Total(Load):
     def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
         work, dissipated = np.sum([load.power(t, q, v) for load in self.loads], axis=0)
         return float(work), float(dissipated)
+
+    def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
+        return next((found for load in self.loads if (found := load.bands(t, q, c, d, g)) is not None), None)
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = np.sum([load.force(t, q, v) for load in self.loads], axis=0)
@@ -62,17 +67,31 @@ def total(loads: tuple[Load, ...]) -> Load | None:
     if motors := [load for load in loads if isinstance(load, Held)]:
         rest = total(tuple(load for load in loads if not isinstance(load, Held)))
         return Held(tuple(axle for load in motors for axle in load.axles), np.zeros_like(motors[0].damping), rest)
-    linear = [load for load in loads if isinstance(load, Linear)]
-    if len(linear) == len(loads):
-        return Linear(
-            constant=np.sum([load.constant for load in linear], axis=0),
-            damping=np.sum([load.damping for load in linear], axis=0),
-            stiffness=np.sum([load.stiffness for load in linear], axis=0),
-            viscosity=_present(linear, "viscosity"),
-            section=_present(linear, "section"),
-            offset=sum(load.offset for load in linear),
-            strain=sum(load.strain for load in linear),
-            drives=tuple(drive for load in linear for drive in load.drives),
-            floor=_floor(linear),
-        )
-    return loads[0] if len(loads) == 1 else Total(loads)
+    others = tuple(load for load in loads if not isinstance(load, Linear))
+    if linear := [load for load in loads if isinstance(load, Linear)]:  # one, as rest shapes of several loads are one strain
+        others = (_linear(linear), *others)
+    return others[0] if len(others) == 1 else Total(others)
+
+
+def _linear(loads: list[Linear]) -> Linear:
+    """The sum of linear loads."""
+    return Linear(
+        constant=np.sum([load.constant for load in loads], axis=0),
+        damping=np.sum([load.damping for load in loads], axis=0),
+        stiffness=np.sum([load.stiffness for load in loads], axis=0),
+        viscosity=_present(loads, "viscosity"),
+        section=_present(loads, "section"),
+        bends=_bends([load.bends for load in loads if load.bends is not None]),
+        offset=sum(load.offset for load in loads),
+        strain=sum(load.strain for load in loads),
+        drives=tuple(drive for load in loads for drive in load.drives),
+        floor=_floor(loads),
+    )
+
+
+def _bends(all_: list[Bends]) -> Bends | None:
+    """The bends of several loads on one chain."""
+    if not all_:
+        return None
+    viscosity, rest = (np.sum([getattr(bends, name) for bends in all_], axis=0) for name in ("viscosity", "rest"))
+    return replace(all_[0], viscosity=viscosity, rest=rest)

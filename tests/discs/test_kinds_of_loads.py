@@ -22,7 +22,7 @@ CLOSE = {"midpoint": 2e-3, "suzuki4": 2e-5, "kahanli6": 1e-6, "gauss6": 1e-6, "r
 def every(problem: Problem) -> tuple:
     """Loads of every kind, uneven along the chain."""
     k, steered = problem.chain.k, isinstance(problem.chain, SteeredChain)
-    own = {"turning": 0.2, "bending": lambda s: 0.03 + 0.02 * s} if steered else {}
+    own = {"turning": 0.2} if steered else {}
     loads = (
         Torque(lambda s: 0.3 - 0.1 * s, signals.sine(1.1, 2.7, 0.4)),
         Torque(-0.2, at=2.2 * k),
@@ -31,10 +31,12 @@ def every(problem: Problem) -> tuple:
         Slope(0.3, -0.2),
         Spring(lambda s: s, 0.1, 0.4),
         Damping(rolling=lambda s: 0.1 * (1 + s), torsion=np.linspace(0.02, 0.3, problem.chain.middles.size), **own),
+        Damping(bending=lambda s: 0.03 + 0.02 * s),
         Rest(twist=0.4),
-        Rest(twist=lambda s: 0.2 * s, signal=signals.sine(0.8, 1.5), **({"curvature": 0.3} if steered else {})),
+        Rest(twist=lambda s: 0.2 * s, curvature=0.6, signal=signals.sine(0.8, 1.5)),
+        Rest(curvature=lambda s: -0.2 - 0.1 * s),
     )
-    return (*loads, Torque(0.1, signals.ramp(0.0, 2.0), about="turn"), Rest(curvature=-0.2)) if steered else loads
+    return (*loads, Torque(0.1, signals.ramp(0.0, 2.0), about="turn")) if steered else loads
 
 
 def as_users(load, problem: Problem):
@@ -76,10 +78,44 @@ def as_users(load, problem: Problem):
                     f[row, i], f[row, k] = f[row, i] + moment, f[row, k] - moment
             if isinstance(load, Rest):
                 of = ((2, load.twist, chain.torsion_stiffness), (3, load.curvature, chain.bending_stiffness))
-                for row, pattern, stiffness in of[: len(q) - 2]:
+                for row, pattern, stiffness in of[: len(q) - 2]:  # own headings; `of_bends` has the others
                     moment = -now * np.asarray(stiffness)[j] * value(pattern, j, middles[j])
                     f[row, i], f[row, k] = f[row, i] + moment, f[row, k] - moment
         return f
+
+    return Custom(force).on(chain)
+
+
+def of_bends(loads, problem: Problem):
+    """Rest curvature and viscosity of bending of slaved headings, by the matrices of r' and r'' at the bends; r = x + i y."""
+    chain, ring = problem.chain, problem.chain.ends == "ring"
+    stiffness = np.asarray(chain.bending_stiffness)
+    inner = slice(None) if stiffness.size == chain.n else slice(1, -1)
+    s, w = chain.s[inner], chain.bend_shares
+    rests = [(load.signal, load.curvature) for load in loads if isinstance(load, Rest)]
+    eta = sum(load.bending(s) for load in loads if isinstance(load, Damping) and callable(load.bending))
+
+    def derivatives(r):
+        first, last = (r[-1], r[0]) if ring else (3 * r[0] - 3 * r[1] + r[2], 3 * r[-1] - 3 * r[-2] + r[-3])
+        if chain.ends == "consistent":
+            first, last = 4 * r[0] - 6 * r[1] + 4 * r[2] - r[3], 4 * r[-1] - 6 * r[-2] + 4 * r[-3] - r[-4]
+        longer = np.concatenate([[first], r, [last]])
+        slope, bend = (longer[2:] - longer[:-2]) / (2 * chain.k), (longer[2:] - 2 * r + longer[:-2]) / chain.k**2
+        if chain.ends == "consistent":
+            for end, sign, line in ((0, 1, r), (-1, -1, r[::-1])):
+                slope[end] = sign * (8 * line[0] - 39 * line[1] + 48 * line[2] - 17 * line[3]) / (6 * chain.k)
+        return slope[inner], bend[inner]
+
+    first, second = derivatives(np.eye(chain.n))
+
+    def force(t, q, v):
+        kappa = sum((1.0 if f is None else f(t)) * (rest(s) if callable(rest) else rest) for f, rest in rests)
+        slope, bend = derivatives(q[0] + 1j * q[1])
+        moment = w * stiffness * (bend - 1j * kappa * slope)
+        turning = second * slope[:, None] - first * bend[:, None]  # times i, the gradient of Im(conj(slope) bend)
+        rate = (1j * turning).conj() @ (v[0] + 1j * v[1])
+        pull = (w * stiffness * bend - moment) @ second - 1j * (kappa * moment) @ first - 1j * (w * eta * rate.real) @ turning
+        return np.array([pull.real, pull.imag, 0 * pull.real])
 
     return Custom(force).on(chain)
 
@@ -88,7 +124,10 @@ def as_users(load, problem: Problem):
 def test_loads_of_every_kind_move_discs_as_the_saddle_point_says(model, kernels_as_python):
     problem = uneven(7, model)
     loads = every(problem)
-    expected, multipliers = by_multipliers(replace(problem, loads=tuple(as_users(load, problem) for load in loads)))
+    again = [as_users(load, problem) for load in loads]
+    if not isinstance(problem.chain, SteeredChain):
+        again.append(of_bends(loads, problem))
+    expected, multipliers = by_multipliers(replace(problem, loads=tuple(again)))
     for name, close in CLOSE.items():
         for engine in ("compiled", "plain") if name in ("midpoint", "gauss6") else ("compiled",):
             found, contact_force = by_discs(replace(problem, loads=loads), name, engine)

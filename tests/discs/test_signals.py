@@ -17,8 +17,8 @@ from tests.discs.test_loads import KINDS
     [
         (lambda p: Damping(rolling=-0.1), "rolling of Damping must be finite and at least 0; got -0.1"),
         (lambda p: Damping(torsion=np.ones(7)), r"torsion of Damping must be a number or an array of shape \(6,\)"),
-        (lambda p: Damping(bending=0.1), "Damping: bending is for discs with headings of their own"),
-        (lambda p: Rest(curvature=0.1), "Rest: curvature is for discs with headings of their own"),
+        (lambda p: Damping(bending=-0.1), "bending of Damping must be finite and at least 0"),
+        (lambda p: Rest(curvature=np.ones(3)), r"curvature of Rest must be a number or an array of shape \(5,\)"),
         (lambda p: Rest(mounting_angle=0.1), "Rest: mounting_angle is for discs with headings of their own"),
         (lambda p: Torque(1.0, about="turn"), "Torque: about='turn' is for discs with headings"),
         (lambda p: Torque(1.0, about="pitch"), "about of Torque must be one of 'roll', 'turn'"),

@@ -19,6 +19,8 @@ class LinkLaw(Protocol):
     end_bends : whether "consistent" ends have a bending spring.
     stretches : whether it takes a `stretch_stiffness`.
     directed : whether it needs d != 0.
+
+    `rest`, a rest curvature (n_bends,), is given to laws that are not quadratic; to the others `discs.loads.bends` adds it.
     """
 
     name: ClassVar[str]
@@ -27,7 +29,7 @@ class LinkLaw(Protocol):
     stretches: ClassVar[bool]
     directed: ClassVar[bool]
 
-    def __init__(self, chain: "Chain") -> None: ...
+    def __init__(self, chain: "Chain", rest: Float | float = 0.0) -> None: ...
 
     @staticmethod
     def density(bending: Float, stretching: Float, z: Complex, z1: Complex) -> Float:

@@ -33,7 +33,10 @@ class Line(NamedTuple):
 
 
 class TrueCurvature(LinkLaw):
-    """Bending energy K phi'**2/2 with phi the direction of the line, and stretch energy A (|r'| - 1)**2/2."""
+    """Bending energy K (phi' - rest)**2/2 with phi the direction of the line, and stretch energy A (|r'| - 1)**2/2.
+
+    rest : the rest curvature, (n_bends,).
+    """
 
     name = "true"
     quadratic, end_bends, stretches, directed = False, False, True, True
@@ -45,9 +48,9 @@ class TrueCurvature(LinkLaw):
         density: Float = bending * turning**2 + stretching * (np.abs(z) - 1) ** 2
         return density
 
-    def __init__(self, chain: "Chain") -> None:
+    def __init__(self, chain: "Chain", rest: Float | float = 0.0) -> None:
         n, k = chain.n, chain.k
-        self._k, self._ring = k, chain.ends == "ring"
+        self._rest, self._k, self._ring = rest, k, chain.ends == "ring"
         self._bending = np.asarray(chain.bending_stiffness) * chain.bend_shares
         self._stretching = np.asarray(chain.stretch_stiffness) * k
         self._torsion = np.asarray(chain.torsion_stiffness) * k
@@ -75,7 +78,8 @@ class TrueCurvature(LinkLaw):
 
     def potential(self, d: Float) -> float:
         stretch, twist = np.hypot(d[0], d[1]) / self._k - 1, d[2] / self._k
-        return 0.5 * float(self._bending @ self._turning(d) ** 2 + self._stretching @ stretch**2 + self._torsion @ twist**2)
+        bend = self._turning(d) - self._rest
+        return 0.5 * float(self._bending @ bend**2 + self._stretching @ stretch**2 + self._torsion @ twist**2)
 
     def polarised(self, d: Float, other: Float) -> float:
         raise ValueError("V is not quadratic with curvature='true'")
@@ -91,7 +95,7 @@ class TrueCurvature(LinkLaw):
 
     def tension(self, secant: Line) -> Float:
         before, after, turn, stretch = secant
-        moment = self._bending * 0.5 * (self._turning(before) + self._turning(after))
+        moment = self._bending * (0.5 * (self._turning(before) + self._turning(after)) - self._rest)
         length = 0.5 * (np.hypot(before[0], before[1]) + np.hypot(after[0], after[1]))
         tension = np.empty_like(before)
         before_bend, after_bend = self._around(moment)
