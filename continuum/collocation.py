@@ -1,6 +1,6 @@
 """A Gauss step of a rod on n functions; the compiled twin is in `continuum.kernels`.
 
-Stages and sweeps are those of `discs.integrators.gauss`. Three things differ, because steps are long here and matrices are full:
+Stages and sweeps are those of `discs.integrators.collocated`. Three things differ, as steps are long here and matrices are full:
 
 1. The common C is that of an earlier step. Its matrix is stored by its eigenvectors, which serve for every length of step
    (`continuum.modes`).
@@ -26,8 +26,8 @@ from numpy.polynomial import legendre
 from continuum.galerkin import SpectralRod
 from continuum.modes import Modes, Pencil
 from discs.arrays import Float
+from discs.integrators.collocated import Guide, collocate
 from discs.integrators.collocation import Collocation, tableau
-from discs.integrators.gauss import Guide, collocate
 from discs.skew import Phase, add
 
 

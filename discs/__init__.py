@@ -2,7 +2,20 @@
 
 from discs.chains.chain import Chain, SteeredChain
 from discs.files.archive import load
-from discs.integrators import RK4, Gauss4, Gauss6, Gauss8, Integrator, KahanLi6, Leapfrog, McLachlanPerlmutter, Midpoint, Suzuki4
+from discs.integrators import (
+    RK4,
+    Gauss4,
+    Gauss6,
+    Gauss8,
+    Integrator,
+    KahanLi6,
+    Leapfrog,
+    McLachlanPerlmutter,
+    Midpoint,
+    Radau3,
+    Radau5,
+    Suzuki4,
+)
 from discs.mechanics import MechanicalSystem
 from discs.mechanics.friction import first_slip, friction_needed
 from discs.mechanics.lagrange import lagrange_dalembert
@@ -25,6 +38,8 @@ __all__ = [
     "MechanicalSystem",
     "Midpoint",
     "Problem",
+    "Radau3",
+    "Radau5",
     "SimulationError",
     "Solution",
     "State",

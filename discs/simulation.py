@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators import Integrator, find, from_settings
+from discs.integrators import METHODS, Integrator, find, from_settings
 from discs.integrators.base import Cut
 from discs.problem import Problem
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
@@ -148,8 +148,13 @@ def lost_balance(problem: Problem, method: str, run: Solution) -> str:
         return ""
     return (
         f"{method}: the change of energy is work less what dampers took, but at t = {run.t[worst]:g} it is off by "
-        f'{off[worst]:.3g}: the run may not be trusted; take a smaller dt, or "midpoint"'
+        f'{off[worst]:.3g}: the run may not be trusted; {_damped(method)}take a smaller dt, or "midpoint"'
     )
+
+
+def _damped(method: str) -> str:
+    """The cause of lost energy if a method damps."""
+    return f"{method} damps what its steps do not resolve: " if method in METHODS and METHODS[method].damps else ""
 
 
 def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Solution | None = None) -> str:
@@ -167,7 +172,7 @@ def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Sol
         return ""
     return (
         f"{method}: energy is conserved, but at t = {t[worst]:g} it is {energy[worst]:.3g} and not {problem.energy():.3g}: the run "
-        'may not be trusted; take a smaller dt, or a method that keeps energy, as "midpoint"'
+        f'may not be trusted; {_damped(method)}take a smaller dt, or a method that keeps energy, as "midpoint"'
     )
 
 

@@ -14,6 +14,7 @@ from discs.integrators.ivp import BDF, DOP853, LSODA, RK45, Radau
 from discs.integrators.leapfrog import Leapfrog
 from discs.integrators.midpoint import Midpoint
 from discs.integrators.perlmutter import McLachlanPerlmutter
+from discs.integrators.radau import Radau3, Radau5
 from discs.integrators.rk4 import RK4
 
 
@@ -77,6 +78,8 @@ __all__ = [
     "Midpoint",
     "OneStep",
     "Radau",
+    "Radau3",
+    "Radau5",
     "Suzuki4",
     "Work",
     "find",

@@ -115,6 +115,7 @@ class Integrator(ABC):
     offers : names of further quantities at frames, see `extras`.
     takes_loads : whether it takes all loads, or only those that are part of the energy.
     takes_motors : whether it takes discs whose rate is given.
+    damps : whether it damps oscillations that its steps do not resolve.
     adaptive : whether it chooses its own steps; below, h is then the longest step.
     """
 
@@ -126,6 +127,7 @@ class Integrator(ABC):
     offers: ClassVar[tuple[str, ...]] = ()
     takes_loads: ClassVar[bool] = True
     takes_motors: ClassVar[bool] = False
+    damps: ClassVar[bool] = False
     adaptive: ClassVar[bool]
 
     @final

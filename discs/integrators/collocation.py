@@ -1,4 +1,4 @@
-"""Gauss collocation: its coefficients, and the compiled step; the plain twin is `discs.integrators.gauss`."""
+"""Collocation at Gauss or Radau points: coefficients, and the compiled step; the plain twin is `discs.integrators.collocated`."""
 
 from functools import cache
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from discs.skew import Phase
 
 
 class Tableau(NamedTuple):
-    """Coefficients of an s-stage Gauss method.
+    """Coefficients of an s-stage collocation method.
 
     a : (s, s). b, nodes : (s,), weights, and places in [0, 1]. last : (s,), b^T a^{-1}, from the momenta of stages to those at the
     end of the step.
@@ -38,11 +38,24 @@ class Tableau(NamedTuple):
 
 @cache
 def tableau(stages: int) -> Tableau:
-    """Collocation at the zeros c of the Legendre polynomial on [0, 1]: sum_j a_ij c_j^m = c_i^(m+1)/(m+1) for m < s."""
+    """Gauss: collocation at the zeros of the Legendre polynomial P_s on [0, 1], of order 2 s."""
     nodes, weights = np.polynomial.legendre.leggauss(stages)
-    c, b = (nodes + 1) / 2, weights / 2
-    powers = np.arange(stages)
+    return _collocation((nodes + 1) / 2, weights / 2)
+
+
+@cache
+def radau(stages: int) -> Tableau:
+    """Radau IIA: collocation at the zeros of P_s - P_{s-1} on [0, 1], of order 2 s - 1. The last stage is the end of the step."""
+    nodes = np.polynomial.legendre.legroots(np.eye(stages + 1)[-1] - np.eye(stages + 1)[-2])
+    c = (np.append(np.sort(nodes.real)[:-1], 1.0) + 1) / 2
+    return _collocation(c, None)._replace(last=np.eye(stages)[-1])
+
+
+def _collocation(c: Float, b: Float | None) -> Tableau:
+    """Collocation at c: sum_j a_ij c_j^m = c_i^(m+1)/(m+1) for m < s. Weights that are not given are those of the last stage."""
+    powers = np.arange(c.size)
     a = (c[:, None] ** (powers + 1) / (powers + 1)) @ np.linalg.inv(c[:, None] ** powers)
+    b = a[-1].copy() if b is None else b
     values, out = np.linalg.eig(a)
     into = np.linalg.inv(out)
     real, upper = np.abs(values.imag) < 1e-12, values.imag > 1e-12

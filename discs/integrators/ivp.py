@@ -199,6 +199,7 @@ class Radau(SolveIvp):
     """Radau IIA of order 5; implicit, damps unresolved oscillations."""
 
     name: ClassVar[str] = "Radau"
+    damps: ClassVar[bool] = True
     order: ClassVar[int] = 5
 
     def options(self, f: Reduced) -> dict[str, Any]:
@@ -209,6 +210,7 @@ class BDF(SolveIvp):
     """Backward differences of orders 1 to 5. Orders above 2 are unstable for oscillations, so it is slow for many discs."""
 
     name: ClassVar[str] = "BDF"
+    damps: ClassVar[bool] = True
     order: ClassVar[int] = 5
 
     def options(self, f: Reduced) -> dict[str, Any]:

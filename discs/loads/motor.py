@@ -5,7 +5,8 @@ row of the disc in their linear system is replaced by a damper of strength HELD 
 of the row vanish beside it in double precision, so elimination gives omega_i to the last bits. The torque follows from the row that
 was replaced, pi'_i = c_i . (f - grad V) + c_i tau.
 
-The midpoint rule and Gauss methods impose the rate inside the steps. At the ends of steps it is as accurate as the method.
+The midpoint rule and collocation methods impose the rate inside the steps. At the ends of steps it is as accurate as the method,
+and exact for Radau methods, whose last stage is there.
 """
 
 from dataclasses import dataclass

@@ -8,14 +8,17 @@ import pytest
 
 from discs import Chain, Gauss8, Leapfrog, McLachlanPerlmutter, Midpoint, Problem, State, simulate
 from discs.integrators import METHODS, Integrator, Work, find
+from discs.integrators.collocated import Collocated
 from discs.integrators.collocation import tableau
 from discs.integrators.composition import Composition
-from discs.integrators.gauss import Gauss
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, models_and_engines, uneven
 from tests.discs.test_system import contact_from_the_definition
 
 # long steps, to be well above rounding
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:.* is too long for this motion")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:.* is too long for this motion", "ignore:radau3. energy is conserved"),
+]
 
 FIXED = [name for name, cls in METHODS.items() if not cls.adaptive]
 ADAPTIVE = [name for name, cls in METHODS.items() if cls.adaptive]
@@ -28,7 +31,7 @@ def tight(name: str) -> Integrator:
     cls = METHODS[name]
     if issubclass(cls, Composition):
         return cls(Midpoint(tolerance=1e-14))
-    return cls(tolerance=1e-14) if issubclass(cls, (Midpoint, Gauss, McLachlanPerlmutter)) else cls()
+    return cls(tolerance=1e-14) if issubclass(cls, (Midpoint, Collocated, McLachlanPerlmutter)) else cls()
 
 
 # steps per unit of time, in the asymptotic range of each method and above round-off
@@ -39,6 +42,8 @@ STEPS = {
     "gauss4": (40, 80, 160),
     "gauss6": (45, 68, 100),
     "gauss8": (10, 15, 22),
+    "radau3": (80, 160, 320),
+    "radau5": (40, 60, 90),
     "rk4": (80, 160, 320),
     "leapfrog": (160, 320, 640),
     "mclachlan-perlmutter": (160, 320, 640),
