@@ -85,7 +85,8 @@ def unseen(scene: Scene, problem: Problem) -> str:
     try:
         found = resolve(scene)
     except ValueError as error:
-        return f"the discs have no limit as a field: {error}"
+        rough = str(error).startswith(tuple(scene.rod.varying))  # of parameters
+        return f"{'more discs converge slowly' if rough else 'the discs have no limit as a field'}: {error}"
     problem = replace(problem, loads=())
     pi = problem.start().pi
     parts = {"potential energy": (abs(found.potential - problem.energy() + 0.5 * float(np.vdot(pi, pi))), found.potential)}

@@ -347,7 +347,7 @@ def test_corners_are_slow_and_jumps_refused(few):
     glued = untwisting_rod(duration=1.0, bending_stiffness=lambda s: 0.7 + (s > 2.3))
     with pytest.raises(ValueError, match=r"bending_stiffness jumps by 1 at s = 2.3: a parameter of a rod is continuous"):
         solve(glued, 1e-3, progress=False)
-    with pytest.warns(UserWarning, match="no limit as a field: bending_stiffness jumps"):
+    with pytest.warns(UserWarning, match="more discs converge slowly: bending_stiffness jumps"):
         lump(glued, 9)
     with pytest.raises(ValueError, match=r"density must be periodic on a closed scene: at s = length it is 1\.4"):
         solve(breathing_ring(density=lambda s: 1 + 0.1 * s), 1e-3, progress=False)
