@@ -72,6 +72,24 @@ def test_nonholonomic_rod_and_the_sign_that_is_misprinted():
     assert same(power[1], 2 * R * mu * x.diff(s) * theta.diff(t))
 
 
+def test_a_rod_whose_parameters_vary():
+    """They stand inside the derivatives; s -> s + const is no symmetry: its balance has dL/ds as a source (`continuum.balance`)."""
+    at = {symbol: sy.Function(symbol.name)(s) for symbol in PARAMETERS}
+    rho_s, alpha_s, beta_s, k_s, r_s = (at[symbol] for symbol in PARAMETERS)
+    theory = FieldTheory((KINETIC - ELASTIC).subs(at), (x, y, theta), tuple(c.subs(at) for c in ROLLING))
+    lam, mu = theory.multipliers
+    equations = theory.equations()
+    assert same(equations[0], -(rho_s * x.diff(t, 2) + (k_s * x.diff(s, 2)).diff(s, 2) + lam))
+    assert same(equations[1], -(rho_s * y.diff(t, 2) + (k_s * y.diff(s, 2)).diff(s, 2) + mu))
+    torque = (beta_s * theta.diff(s)).diff(s) - alpha_s * theta.diff(t, 2)
+    assert same(equations[2], torque - r_s * (lam * y.diff(s) - mu * x.diff(s)))
+    moving = rho_s.diff(s) * (x.diff(t) ** 2 + y.diff(t) ** 2) + alpha_s.diff(s) * theta.diff(t) ** 2
+    bent = k_s.diff(s) * (x.diff(s, 2) ** 2 + y.diff(s, 2) ** 2) + beta_s.diff(s) * theta.diff(s) ** 2
+    assert same(theory.noether({s: 1}).invariance, (moving - bent) / 2)
+    assert same(theory.noether({t: 1}).invariance, 0)
+    assert all(same(work, 0) for work in theory.noether({t: 1}).work)
+
+
 def test_euler_lagrange_against_sympy():
     """A nonlinear Lagrangian with every second derivative, the mixed one too."""
     lagrangian = x * y.diff(t, s) ** 2 * s + sy.sin(x.diff(t)) * y.diff(t, 2) + x.diff(s, 2) ** 3 * y + t * x.diff(t, s) * y.diff(s)
