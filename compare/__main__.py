@@ -46,7 +46,7 @@ def parser() -> argparse.ArgumentParser:
         "--out",
         metavar="DIR",
         default="out",
-        help="folder for the results: table, convergence, motion, energy over 100/3 durations (default: out)",
+        help="folder for the results: table, convergence, motion, energy over 33 times the scene's duration (default: out)",
     )
     p.add_argument("--n", metavar="N", type=int, nargs="+", default=list(SIZES), help="numbers of discs (default: 17 ... 513)")
     p.add_argument(

@@ -98,7 +98,7 @@ def load_limits(out: str | Path, progress: bool = True, n: tuple[int, ...] = SIZ
 
     given = scenes()
     with fresh_files(out) as folder:
-        bar = tqdm(given.items(), desc="loads", unit="load", delay=1, disable=not progress)
+        bar = tqdm(given.items(), desc="loads", unit="load", disable=not progress)
         found = {name: study(scene, n, tol) for name, scene in bar}
         rows = list(_rows(found))
         with (folder / "loads.csv").open("w", newline="", encoding="utf-8") as file:

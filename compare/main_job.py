@@ -31,7 +31,7 @@ def overview(
 ) -> list[Study]:
     """Compare a scene's discs with its field; write the table and the pictures to `out`.
 
-    Writes convergence.csv, convergence.png, motion.png and energy.png. The energy is shown over 100/3 of the scene's duration,
+    Writes convergence.csv, convergence.png, motion.png and energy.png. The energy is shown over 33 times the scene's duration,
     [0, 150] for the paper's, and over the duration itself for a closed rod (under the unit law a ring collapses).
 
     Parameters

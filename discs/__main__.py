@@ -24,7 +24,8 @@ def parser() -> argparse.ArgumentParser:
     """The options."""
     p = argparse.ArgumentParser(
         prog="python -m discs",
-        description="N rolling discs joined by springs. Any consistent units. Scenes from files: python -m continuum discs.",
+        description="N rolling discs joined by springs. Any consistent units. "
+        "To run a scene from a file: python -m continuum discs --scene FILE.toml.",
     )
     commands = p.add_subparsers(metavar="COMMAND", title="commands", required=True, dest="command")
     run = commands.add_parser(

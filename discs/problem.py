@@ -174,12 +174,12 @@ class Problem:
 
     @cached_property
     def blown_up(self) -> float:
-        """Blow-up threshold of the kinetic energy: ten times the most that conservation of energy allows; infinite without a bound.
+        """Blow-up threshold of the kinetic energy: ten times the most that the balance of energy allows; infinite without a bound.
 
         V >= 0, so that is the energy, less the least potential of loads. The small constant keeps rounding at rest below it.
         """
         load, chain = self.system.load, self.chain
-        if not self.conserves:
+        if load is not None and not (load.conservative or load.passive):
             return np.inf
         most = self.energy() if load is None else self.energy() - load.least
         stiffest = np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)

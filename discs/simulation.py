@@ -98,9 +98,8 @@ def doubted(problem: Problem, run: Solution) -> str:
     stats = run.stats
     doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # first, as it is cheap and most runs pass
     if doubtful and (reasons := doubts(stats)):
-        said += (
-            f"{' ' if said else ''}{method}: {'; '.join(reasons)}: the run may not be trusted; take {cure(run.stats)}, or tol=1e-3"
-        )
+        joint, cured = "; and " if said else "", cure(run.stats)
+        said += f"{joint}{method}: {'; '.join(reasons)}: the run may not be trusted; take {cured}, or tol=1e-3"
     return said
 
 

@@ -71,6 +71,7 @@ class Load(ABC):
     section : rest strains that become part of V: (2, n_links), stretch and shear of links of discs with their own headings, or
         (n_bends,), the curvature of chains with the true curvature. None for none.
     conservative : whether f = -grad U with U = `potential`; then the energy, U included, is conserved.
+    passive : whether its power is that of -U and of dampers only, so that the energy can fall but not grow.
     least : a lower bound of U, used to detect blow-up; -inf if none is known.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
     """
@@ -81,6 +82,7 @@ class Load(ABC):
     axles: tuple[Any, ...] = ()
     section: Float | None = None
     conservative: bool = False
+    passive: bool = False
     least: float = -np.inf
 
     def potential(self, t: float, q: Float) -> float:

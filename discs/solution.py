@@ -147,7 +147,7 @@ class Solution(Result):
         kept = "energy" if self.balance is None else "energy - work + dissipated"
         return (
             f"Solution({frames} frames of {n} discs, t = {self.t[0]:g} to {self.t[-1]:g}, "
-            f"method {self.stats.get('method')!r}, {kept} {off[0]:.6g} to within {drift:.1e}"
+            f"method {self.stats.get('method')!r}, {kept} = {off[0]:.6g}, constant to {drift:.1e}"
             f"{''.join(f'; {doubt}' for doubt in doubts(self.stats))})"
         )
 

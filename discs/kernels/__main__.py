@@ -24,6 +24,9 @@ def sharing() -> list[list[Integrator]]:
     return list(found.values())
 
 
+KINDS = {"slaved": tuple(ROLLING), "own": ("own",)}  # of chains; laws in one process share what does not depend on the law
+
+
 def compile_for(law: str) -> None:
     """Compile every kernel for one kind of chain: slaved headings with this law of rolling, or "own" headings."""
     steered = law == "own"
@@ -38,7 +41,8 @@ def compile_for(law: str) -> None:
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        compile_for(sys.argv[1])
+        for law in KINDS[sys.argv[1]]:
+            compile_for(law)
     else:  # in parallel, one process each
-        both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", law]) for law in (*ROLLING, "own")]
+        both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", kind]) for kind in KINDS]
         sys.exit(max(process.wait() for process in both))

@@ -88,6 +88,7 @@ class Linear(Load):
             object.__setattr__(self, "viscosity", links)
         damped = self.damping.any() or self.viscosity is not None or (self.bends is not None and self.bends.viscosity.any())
         object.__setattr__(self, "conservative", not damped and not self.drives)
+        object.__setattr__(self, "passive", not self.drives)
         pushed = self.constant != 0
         push, spring = self.constant[pushed], self.stiffness[pushed]
         least = self.offset - 0.5 * float((push**2 / spring).sum()) if spring.all() else -np.inf

@@ -24,6 +24,7 @@ class Total(Load):
         for name in ("viscosity", "section"):
             object.__setattr__(self, name, _present(self.loads, name))
         object.__setattr__(self, "conservative", all(load.conservative for load in self.loads))
+        object.__setattr__(self, "passive", all(load.conservative or load.passive for load in self.loads))
         object.__setattr__(self, "least", sum(load.least for load in self.loads))
 
     def potential(self, t: float, q: Float) -> float:

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discs import Chain, Midpoint, Problem, State, simulate
+from discs import Chain, Midpoint, Problem, SimulationError, State, simulate
 from discs.integrators import METHODS, Work
-from discs.loads import Linear, Load, total
+from discs.loads import Damping, Linear, Load, total
 from discs.mechanics.lagrange import frames as coordinates
 from discs.mechanics.lagrange import lagrange_dalembert
 from tests.conftest import Model, models, uneven
@@ -163,7 +163,12 @@ def test_the_bound_of_kinetic_energy_knows_the_loads():
     assert free.system.load.least == pytest.approx(least)
     assert free.blown_up == pytest.approx(10 * (free.energy() - least), rel=1e-12)
     assert held(0.0, 0.2).blown_up == pytest.approx(10 * held(0.0, 0.2).energy(), rel=1e-12)
-    assert pushed.blown_up == braked.blown_up == np.inf
+    assert pushed.blown_up == np.inf
+    assert braked.blown_up == pytest.approx(10 * (braked.energy() - braked.system.load.least), rel=1e-12)  # it only loses
+    slowed = replace(problem, loads=(Damping(rolling=0.1), *held(0.3, 0.2).loads))
+    assert slowed.blown_up == pytest.approx(free.blown_up, rel=1e-12)
+    with pytest.raises(SimulationError, match="the run blew up"):
+        simulate(replace(slowed, duration=9.0), "rk4", 0.5, progress=False, engine="plain")
     assert [p.conserves for p in (problem, free, pushed, braked)] == [True, True, True, False]
     both = total((Well((3, 7)), *held(0.3, 0.2).loads))
     q = problem.start().hi
