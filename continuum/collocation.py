@@ -110,6 +110,15 @@ def spent(h: float, power: Float, parts: Float) -> Float:
     return h * legendre.legvander(2 * parts - 1, len(power)) @ _polynomials(len(power))[0] @ power
 
 
+def between(values: Float, parts: Float) -> Float:
+    """Values at the stages of a step, (s, m), at fractions `parts` (F,) of it, (F, m): the polynomial through them."""
+    nodes, _ = legendre.leggauss(len(values))
+    found: Float = legendre.legvander(2 * parts - 1, len(values) - 1) @ np.linalg.solve(
+        legendre.legvander(nodes, len(values) - 1), values
+    )
+    return found
+
+
 @cache
 def _polynomials(stages: int) -> tuple[Float, Float]:
     """Legendre coefficients, (stages + 1, stages), of int_0^tau l_j and of L_j."""

@@ -29,33 +29,24 @@ depend on time: with the stiffness S and the strain a it is the integral of -S (
 integral of S e a. .
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, singledispatch
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from continuum.element_grid import Grid
 from continuum.load_places import cut_patterns, point_loads
 from continuum.load_terms import ROLL, Terms, X, Y, add
+from continuum.motors import Axle, Motors
 from continuum.rod import Scene
 from continuum.timing import Timing
 from discs import checks
 from discs.arrays import Float
 from discs.loads import Damping, Motor, Rest, signals
 from discs.loads.binding import ROW
-from discs.loads.motor import change
-from discs.loads.signals import Signal
 
 INSIDE = 1e-12  # of the length: patterns are read this far from edges, on the side of the element
-
-
-class Axle(NamedTuple):
-    """A driven angle: row ROLL or TURN, place and rate."""
-
-    row: int
-    at: float
-    rate: Signal
 
 
 @dataclass(eq=False)
@@ -65,8 +56,6 @@ class SteeredTerms(Terms):
     damping : (4, S), rolling and turning resistance times the weights, and viscosities of torsion and bending.
     strain : (4, S), constant rest strains: stretch, shear, twist, curvature; those of drives alike.
     """
-
-    axles: list[Axle] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -116,11 +105,11 @@ class ElementLoads:
     push : (4, n), constant forces with a potential. stiffness : (n,), of springs on x and y. drag : (2, n), on omega and phi. .
     viscosity : (2, P, p + 1), of torsion and bending. rest : (4, P, p + 1), constant rest strains. offset : energy.
     drives : (L, 4, n), and strains (L, 4, P, p + 1), which signals multiply.
-    axles : the motors. driven : (motors,) each, their rows in (omega, phi.) and their nodes.
+    motors : the motors. driven : (motors,) each, their rows in (omega, phi.) and their nodes.
     """
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
-        self._grid, self._duration, length = grid, scene.duration, scene.rod.length
+        self._grid, length = grid, scene.rod.length
         inward = np.zeros(grid.places.shape[1])
         inward[[0, -1]] = INSIDE * length, -INSIDE * length
         points = np.array(point_loads(scene))
@@ -153,10 +142,11 @@ class ElementLoads:
         strains = [local(np.zeros((4, 1)) * s + drive.strain) for drive in drives]
         self.strains = np.array(strains).reshape(-1, 4, *grid.places.shape)
         self._signals = [(drive.signal, drive.name) for drive in drives] + [(axle.rate, "Motor") for axle in terms.axles]
-        self.axles = terms.axles
         ends = [int(grid.index.flat[np.argmin(np.abs(grid.places - axle.at))]) for axle in terms.axles]
         self.driven = np.array([axle.row - ROLL for axle in terms.axles], dtype=int), np.array(ends, dtype=int)
         self.timing = Timing(scene)
+        initial = [scene.fields(np.array([axle.at]))["omega" if axle.row == ROLL else "phi_rate"][0] for axle in terms.axles]
+        self.motors = Motors(terms.axles, self.timing, scene.duration, np.array(initial))
 
     def values(self, t: float) -> Float:
         """The signals of the drives and the rates of the motors, (L + motors,)."""
@@ -175,7 +165,7 @@ class ElementLoads:
 
     def held(self, values: Float, q: Float) -> Float:
         """The unknowns (6, n) with the rates of motors."""
-        if self.axles:
+        if self.motors.axles:
             q = q.copy()
             q[4 + self.driven[0], self.driven[1]] = values[len(self.drives) :]
         return q
@@ -198,10 +188,6 @@ class ElementLoads:
         lost = float((self.drag * v[2:] ** 2).sum()) + float(np.vdot(self._grid.w, (self.viscosity * bent**2).sum(axis=0)))
         return np.array([work, lost])
 
-    def changes(self, times: Float) -> Float:
-        """Rates of change of the rates of motors at times (F,), (F, motors)."""
-        return np.array([[change(axle.rate, t, self._duration) for axle in self.axles] for t in times])
-
     def fastest(self, inertia: Float, radius: float) -> float:
         """A bound of the fastest rate at which loads change the motion: decay by damping, oscillation on springs.
 
@@ -210,26 +196,6 @@ class ElementLoads:
         drag, grid = self.drag / inertia, self._grid
         strain = self.viscosity * grid.steepest / (inertia / grid.weights)[:, grid.index]
         return float(max(drag.max() + strain.max(), radius * np.sqrt((self.stiffness / inertia[0]).max())))
-
-    def check_start(self, start: Float) -> None:
-        """Refuse initial rates (6, n) that are not those of motors, two motors at one place, and rates that jump."""
-        for i, (row, node) in enumerate(zip(*self.driven, strict=True)):
-            rate, initial = self.values(0.0)[len(self.drives) + i], start[4 + row, node]
-            name = ("omega", "phi_rate")[row]
-            if not abs(initial - rate) <= 1e-9 * max(1.0, abs(rate)):
-                raise ValueError(
-                    f"Motor: its rate at t = 0 must be the initial {name} at s = {self.axles[i].at:g}, {initial:g}; got {rate:g}: "
-                    "change one, or start the motor smoothly"
-                )
-            if any(pair == (row, node) for pair in zip(*(part[:i] for part in self.driven), strict=True)):
-                raise ValueError(f"Motor: s = {self.axles[i].at:g} has two motors about the same axis; leave one out")
-        short = 1e-9 * self._duration
-        for t in self.timing.stops[:-1] if self.axles else ():
-            sides = np.array([self.values(t - short), self.values(t + short)])[:, len(self.drives) :]
-            if (np.abs(sides[1] - sides[0]) > 1e-6 * np.maximum(1.0, np.abs(sides[0]))).any():
-                raise ValueError(
-                    f"Motor: its rate jumps at t = {t:g}, which takes an infinite torque; take a ramp, as signals.smooth"
-                )
 
     def energy(self, q: Float) -> float:
         """The energy of loads that is no elastic energy, of unknowns (6, n)."""

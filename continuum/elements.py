@@ -103,9 +103,7 @@ class Elements:
         """The loads of the scene; None for none."""
         if not self.scene.loads:
             return None
-        loads = ElementLoads(self.scene, self.grid)
-        loads.check_start(self.start)
-        return loads
+        return ElementLoads(self.scene, self.grid)
 
     def energy(self, q: Float, rest: Float | float = 0.0) -> float:
         """Kinetic and potential energy of (6, n), with rest strains (4, P, DEGREE + 1)."""
@@ -171,10 +169,10 @@ class Elements:
 
         gained = np.array([driven(*pair) for pair in zip(values, q, strict=True)]) - driven(loads.values(0.0), self.start)
         balance = np.stack([spent[:, 0] + gained, spent[:, 1]], axis=1)
-        if not loads.axles:
+        if not loads.motors.axles:
             return balance, None
         torques = [self._torques(z, now)[0][loads.driven] for now, z in zip(values, q, strict=True)]
-        return balance, loads.changes(times) * self._inertia[loads.driven] - np.array(torques)
+        return balance, loads.motors.changes(times) * self._inertia[loads.driven] - np.array(torques)
 
     @cached_property
     def _inertia(self) -> Float:

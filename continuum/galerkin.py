@@ -48,7 +48,6 @@ from continuum.rod import Scene
 from continuum.weak import weak
 from discs.arrays import Complex, Float
 from discs.chains.rolling import ROLLING
-from discs.integrators.collocation import tableau
 from discs.skew import Phase, SkewGradient
 
 DATA = 24  # quadrature points per piece of the initial fields, in addition to those for the functions
@@ -156,6 +155,8 @@ class SpectralRod(SkewGradient):
         a[functions.ends :] = np.linalg.lstsq(root[:, None] * line[:, functions.ends :], root * rest, rcond=None)[0]
         q = np.array([a.real, a.imag, np.zeros(self.n)])
         omega = functions.field(s).T @ (w * fields["omega"]) / functions.w
+        if self.loads:
+            omega[self.loads.held] = self.loads.motors.rates(np.zeros(1))
         start = Phase(q, np.zeros_like(q), omega / self.basis(q).t)
         self._offset = initial.energy + (self.loads.energy if self.loads else 0.0) - self.energy(start)
         return start
@@ -174,10 +175,6 @@ class SpectralRod(SkewGradient):
         """omega at the nodes, (..., n), as in `basis` but without the finer points."""
         e = self._radius * self.law.size(np.abs(self.slopes(z)))
         return z.pi / np.sqrt(self._spin + self._mass * e**2)
-
-    def power(self, t: float, h: float, v: Float) -> Float | None:
-        """The rates of work and dissipation at the stages of a step h from t, (s, 2), for rates v (s, 3, n), if there are loads."""
-        return None if self.loads is None else self.loads.power(t + h * tableau(len(v)).nodes, v)
 
     def energy(self, z: Phase) -> float:
         """Kinetic and potential energy, but for loads that depend on time."""
@@ -288,8 +285,8 @@ class SpectralRod(SkewGradient):
         if self.loads and self.loads.stiffness.size:
             bent += (xy @ self.loads.stiffness).reshape(n, 2 * n) @ xy.reshape(n, 2 * n).T
         stiffness = c.t[:, None] * (bent + self.torsion) * c.t
-        if self.loads and self.loads.damping.size:
-            return Pencil(stiffness, c.t[:, None] * self.loads.damping * c.t)
+        if self.loads and (damping := self.loads.matrix).size:
+            return Pencil(stiffness, c.t[:, None] * damping * c.t)
         values, vectors = np.linalg.eigh(stiffness)
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 

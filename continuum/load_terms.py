@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from continuum.load_places import read
+from continuum.motors import Axle
 from continuum.rod import Scene
 from discs import checks
 from discs.arrays import Float
-from discs.loads import Damping, Force, OnRod, Rest, Slope, Spring, Torque
+from discs.loads import Damping, Force, Motor, OnRod, Rest, Slope, Spring, Torque
 from discs.loads.binding import given, signal_of
 from discs.loads.signals import Signal
 
@@ -45,6 +46,7 @@ class Terms:
     strain: Float = field(init=False)
     offset: float = 0.0
     drives: list[Drive] = field(default_factory=list)
+    axles: list[Axle] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         n = self.s.size
@@ -111,6 +113,16 @@ def _(load: Torque, to: Terms) -> None:
 @add.register
 def _(load: Force, to: Terms) -> None:
     to.drive(load, {X: to.shared(load, "x"), Y: to.shared(load, "y")})
+
+
+@add.register
+def _(load: Motor, to: Terms) -> None:
+    if to.scene.closed or load.at not in (0, to.scene.rod.length):
+        raise ValueError(
+            f"Motor: at s = {load.at:g} it makes a corner inside the rod, which the functions of the spectral method do not have; "
+            "drive an end, or take method='richardson'"
+        )
+    to.axles.append(Axle(to.row(load), load.at, load.signal))
 
 
 @add.register

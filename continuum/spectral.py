@@ -16,6 +16,7 @@ theta, and q^-4 in omega. So the errors finally fall like a power of the step, t
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +76,7 @@ class Motion(NamedTuple):
     fields : (F, S) by name.
     start : largest error of the fields at the start, by name, and what parameters that are not resolved may add to it.
     tolerance : of a step. steps : number of steps.
-    balance : (F, 2), work and dissipation; None without loads.
+    balance, reaction : (F, 2), work and dissipation, and (F, motors), torques of motors; None without loads, and motors.
     """
 
     rod: SpectralRod
@@ -86,6 +87,7 @@ class Motion(NamedTuple):
     tolerance: float
     steps: int
     balance: Float | None = None
+    reaction: Float | None = None
 
 
 class Runner:
@@ -127,11 +129,12 @@ class Runner:
         if self._scene.rod.varying:
             missed = unresolved(rod.functions, self._scene.rod, *resolve(self._scene).quadrature(POINTS))
             start = {name: start[name] + missed * moved for name, moved in distances(fields, begun).items()}
-        balance = None
+        balance = reaction = None
         if rod.loads:  # what signals change of the energy is work, too
             balance = np.concatenate(steps.balance)
             balance[:, 0] += rod.loads.driven(self._times, every.hi + every.lo) - rod.loads.driven(np.zeros(1), rod.start.hi[None])
-        return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance)
+            reaction = np.concatenate(steps.reaction) if rod.loads.held.size else None
+        return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance, reaction)
 
 
 def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
@@ -290,4 +293,5 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progr
     if found.balance is not None:
         estimate["energy"] = float(np.abs(energy - found.balance @ (1, -1) - found.rod.start_energy).max())
     x, y, theta, omega = (found.fields[name] for name in FIELDS)
-    return Solution(times, search.runner.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate, balance=found.balance)
+    run = Solution(times, search.runner.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate, balance=found.balance)
+    return replace(run, reaction=found.reaction)

@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.polynomial import legendre
 
-from continuum import collocation
+from continuum import collocation, driven_ends
 from continuum.galerkin import SpectralRod
 from continuum.modes import Modes, Pencil
 from discs import SimulationError
@@ -80,7 +80,8 @@ class Steps:
     Attributes
     ----------
     lengths : lengths of the steps taken.
-    balance : work and dissipation since the start at the states that `at` gave, in groups (k, 2); without loads none.
+    balance, reaction : work and dissipation since the start at the states that `at` gave, and torques of motors, in groups (k, 2)
+        and (k, motors); without loads none.
     """
 
     def __init__(
@@ -96,30 +97,38 @@ class Steps:
         self._usual, self._excess = 0, 0  # sweeps of the step that computed the modes; additional sweeps of the steps since
         self.lengths: list[float] = []
         self.balance: list[Float] = []
+        self.reaction: list[Float] = []
         self._timing = rod.loads.timing if rod.loads else None
 
     def at(self, times: Float) -> Iterator[Phase]:
         """The states at times (F,), increasing, in groups: arrays have one more leading axis."""
-        t, z, spent = 0.0, self.rod.start, np.zeros(2)
+        t, z, spent, loads = 0.0, self.rod.start, np.zeros(2), self.rod.loads
+        torque = driven_ends.reaction(self.rod, t, z)[None] if loads else np.empty((1, 0))
         while times.size:
             if times[0] <= t:
-                if self.rod.loads:
+                if loads:
                     self.balance.append(spent[None])
+                    self.reaction.append(torque)
                 yield Phase(z.hi[None], z.lo[None], z.pi[None])
                 times = times[1:]
                 continue
             before, start = t, z
             t, z, v, p = self._advance(t, z)
             inside = times[times < t]
-            power = self.rod.power(before, t - before, v)
+            power = None
+            if loads:
+                power, torques = driven_ends.power(self.rod, before, t - before, start, v, p)
+                torque = collocation.between(torques, np.ones(1))
             for some in np.split(inside, range(TOGETHER, inside.size, TOGETHER)):
                 if some.size:
                     parts = (some - before) / (t - before)
                     if power is not None:
                         self.balance.append(spent + collocation.spent(t - before, power, parts))
+                        self.reaction.append(collocation.between(torques, parts))
                     yield collocation.within(start, t - before, v, p, parts)
             if power is not None:
-                spent = spent + collocation.spent(t - before, power, np.ones(1))[0]
+                z, kick = driven_ends.hold(self.rod, t, z)
+                spent = spent + collocation.spent(t - before, power, np.ones(1))[0] + (kick, 0.0)
             times = times[inside.size :]
 
     def _step(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:

@@ -22,6 +22,12 @@ energy sigma^2 beta int tau_0^2/2 - sigma beta int tau_0 theta', and products wi
 beta theta' - K e . r''', the value -tau at s = 0 and +tau at s = length: the natural conditions, which need nothing else. A point
 force acts by e . F there. A rest twist has beta (theta' - tau_0) for beta theta', viscosity adds eta omega' to it.
 
+**Motors** prescribe omega at an end, where psi = 0 then: no curvature and |r'| = 1 stay there. omega at the end is the unknown of a
+node, as those of the other ends and places. Its row of the step is replaced by a stiff damper on omega - rate, as in
+`discs.loads.motor`. The torque is what the row lacks, at the stages of a step: with the pull g = C^T (grad V - f) and C's entry t,
+
+    t_j tau_j = g_j + (1/h) sum_i (a^-1)_ji (P_i - pi_n).
+
 **Large steps.** The matrix of a sweep is I + h a C^T D C + (h a)^2 C^T S C, for the eigenvalues a of the Gauss coefficients. So
 neither stiff damping nor stiff springs limit steps or sweeps. The two matrices have no common eigenvectors, and a damped rod takes
 one inverse matrix for each pair of stages and each step.
@@ -39,9 +45,11 @@ from continuum.initial import Resolved
 from continuum.kernels.spectral_load import Load
 from continuum.load_places import cut_patterns, point_loads
 from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken
+from continuum.motors import Motors
 from continuum.timing import Timing
-from discs.arrays import Float
+from discs.arrays import Float, Int
 from discs.loads import signals
+from discs.loads.motor import HELD
 from discs.loads.signals import Signal
 
 
@@ -53,6 +61,7 @@ class Weak(NamedTuple):
     drives : (L, 3, n). signals, names : of the drives. closing (L,), squares (L, L + 1) : energies of rest twists, see `driven`.
     energy : the energy of the loads with a potential, for the initial fields.
     timing : the pieces of the signals.
+    motors : the motors. held : (motors,), their nodes.
     """
 
     constant: Float
@@ -65,16 +74,30 @@ class Weak(NamedTuple):
     squares: Float
     energy: float
     timing: Timing
+    motors: Motors
+    held: Int
+
+    @property
+    def matrix(self) -> Float:
+        """D with the dampers in the place of motors, (n, n); (0, 0) if there is neither."""
+        if not self.held.size:
+            return self.damping
+        n = self.constant.shape[1]
+        matrix = self.damping.copy() if self.damping.size else np.zeros((n, n))
+        matrix[self.held, self.held] += HELD
+        return matrix
 
     @property
     def parameters(self) -> Load:
         """The parameters of the compiled form; signals are set before each step. The first pattern is the constant one."""
-        patterns = np.concatenate([self.constant[None], self.drives])
-        return Load(patterns.reshape(len(patterns), -1), np.empty((0, len(patterns))), self.damping, self.stiffness)
+        motors = np.zeros((self.held.size, *self.constant.shape))
+        motors[np.arange(self.held.size), 2, self.held] = HELD
+        patterns = np.concatenate([self.constant[None], self.drives, motors])
+        return Load(patterns.reshape(len(patterns), -1), np.empty((0, len(patterns))), self.matrix, self.stiffness)
 
     def at(self, t: Float) -> Float:
         """The signals of the compiled form at the times of stages (s,)."""
-        return np.column_stack([np.ones(t.size), self.values(t)])
+        return np.column_stack([np.ones(t.size), self.values(t), self.motors.rates(t)])
 
     def values(self, t: Float) -> Float:
         """The signals at times (m,), (m, L)."""
@@ -92,14 +115,20 @@ class Weak(NamedTuple):
         return total
 
     def power(self, t: Float, v: Float) -> Float:
-        """The rates of work and dissipation at times (m,) and rates (m, 3, n), (m, 2)."""
+        """The rates of work and dissipation at times (m,) and rates (m, 3, n), (m, 2), without those of motors."""
         work = (self.values(t) * np.einsum("lin,min->ml", self.drives, v)).sum(axis=1)
         omega = v[:, 2]
         lost = (omega @ self.damping * omega).sum(axis=1) if self.damping.size else np.zeros(t.size)
         return np.stack([work, lost], axis=1)
 
     def force(self, t: Float, v: Float) -> Float:
-        """The forces without a potential, at times (m,) and rates (m, 3, n), (m, 3, n)."""
+        """The forces without a potential, and dampers in the place of motors, at times (m,) and rates (m, 3, n), (m, 3, n)."""
+        f = self.applied(t, v)
+        f[:, 2, self.held] += HELD * (self.motors.rates(t) - v[:, 2, self.held])
+        return f
+
+    def applied(self, t: Float, v: Float) -> Float:
+        """The forces without a potential and those of motors, at times (m,) and rates (m, 3, n), (m, 3, n)."""
         f: Float = np.einsum("ml,lin->min", self.values(t), self.drives)
         if self.damping.size:
             f[:, 2] -= v[:, 2] @ self.damping
@@ -141,6 +170,7 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
         0.5 * terms.stiffness @ (start["x"] ** 2 + start["y"] ** 2) - terms.push[X] @ start["x"] - terms.push[Y] @ start["y"]
     )
     terms.push[:2] -= terms.stiffness * straight
+    timing, places = Timing(scene), [np.array([float(axle.at)]) for axle in terms.axles]
     return Weak(
         constant=project(terms.push),
         damping=(theta.T * terms.damping[0]) @ theta + (slope.T * terms.damping[1]) @ slope if terms.damping.any() else none,
@@ -151,5 +181,7 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
         closing=np.array([drive.push[TWIST] @ twisted for drive in terms.drives]),
         squares=strains @ np.vstack([strains, terms.strain]).T,
         energy=terms.offset + float(line_energy + 0.5 * terms.strain @ terms.strain - terms.push[TWIST] @ twisted),
-        timing=Timing(scene),
+        timing=timing,
+        motors=Motors(terms.axles, timing, scene.duration, np.array([initial.fields(at)["omega"][0] for at in places])),
+        held=np.array([0 if axle.at == 0 else n - 1 for axle in terms.axles], dtype=int),
     )

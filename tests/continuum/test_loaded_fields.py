@@ -10,7 +10,7 @@ from continuum.balance import balances
 from continuum.dispersion import response
 from continuum.spectral import Runner
 from discs import load
-from discs.loads import Custom, Damping, Force, Potential, Rest, Slope, Spring, Torque, signals
+from discs.loads import Custom, Damping, Force, Motor, Potential, Rest, Slope, Spring, Torque, signals
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": 3.0}
 ROD = Rod(**UNEVEN)
@@ -225,6 +225,9 @@ def test_a_scene_without_loads_computes_none():
         ((Spring(0, 0, -1.0),), r"stiffness of Spring must be at least 0; got -"),
         ((Torque(1.0, lambda t: np.nan),), r"Torque: the signal .* finite numbers; got nan at t = "),
         ((Torque(1.0, lambda t: np.random.default_rng().random()),), r"the signal of Torque must be a function of the time"),
+        ((Motor(0.0, at=1.0),), r"Motor: at s = 1 it makes a corner inside the rod.*; drive an end, or take method='richardson'"),
+        ((Motor(0.3, at=0.0),), r"Motor: its rate at t = 0 must be the initial omega at s = 0, 0; got 0\.3"),
+        ((Motor(signals.pulse(0.5, 0.1), at=3.0),), r"Motor: its rate jumps at t = 0\.5"),
         ((Custom(lambda t, q, v: q),), r"Custom: the spectral solver has no form of it; take method='richardson'"),
         ((Potential(lambda x, y: x, lambda x, y: (1, 0)),), r"Potential: the spectral solver has no form of it"),
     ],
