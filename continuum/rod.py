@@ -124,6 +124,11 @@ def _settle(rod: Rod, names: tuple[str, ...]) -> None:
         given = getattr(rod, name)
         if name != "length" and callable(given):
             continue
+        if name != "length" and (isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim)):
+            raise ValueError(
+                f"{name} of a rod must be a number or a function of s; got {checks.shown(given)}: "
+                "continuum.parameters.table(s, values) interpolates"
+            )
         value = checks.number(name, given, positive=name in ("length", *POSITIVE))
         if value < 0:
             raise ValueError(f"{name} must be at least 0; got {checks.shown(value)}")

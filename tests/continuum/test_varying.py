@@ -382,6 +382,8 @@ def test_elements_resolve_narrow_parameters():
         ("density", lambda s: s + 1j, "density must be .*complex numbers"),
         ("density", lambda s: None, "density must be .*got None"),
         ("density", "1 + s", r"density must be a positive finite number; got '1 \+ s'"),
+        ("density", np.ones(5), r"density of a rod must be a number or a function of s; got an array of shape \(5,\).*table"),
+        ("radius", [1.0, 0.5], r"radius of a rod must be a number or a function of s; got \[1.0, 0.5\].*table"),
         ("length", lambda s: 4.0, "length must be a positive finite number"),
     ],
 )
