@@ -11,6 +11,7 @@ from continuum.rod import Scene
 from discs import checks
 from discs.arrays import Float
 from discs.loads import OnRod
+from discs.loads.binding import sampled
 
 NOT_PATTERNS = ("signal", "rate", "V", "gradient", "force", "power")  # functions of other variables than s
 
@@ -19,8 +20,7 @@ def read(name: str, pattern: Any, s: Float, least: float | None = None) -> Float
     """A pattern, a number or a function of s, at places (S,)."""
     if not callable(pattern):
         checks.number(name, pattern)
-    found: Float = checks.field(name, pattern(s.copy()) if callable(pattern) else pattern, s.size, least=least)
-    return found
+    return sampled(name, pattern, s, least)
 
 
 def patterns(loads: tuple[OnRod, ...]) -> dict[str, Callable[[Float], Float]]:

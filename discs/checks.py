@@ -7,7 +7,7 @@ times, complex numbers (even with imaginary part 0) and arrays with masked entri
 import math
 import operator
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -82,10 +82,20 @@ def array(name: str, value: ArrayLike, need: str = "finite numbers") -> Float:
     return given
 
 
-def field(name: str, value: ArrayLike, size: int, *, least: float | None = None, strict: bool = False) -> Float:
+def called(name: str, function: Callable[..., Any], *arguments: Any, where: str = "") -> Any:
+    """What a user's function returns. If it raises, ValueError with its name, the error, and `where` it was called."""
+    try:
+        return function(*arguments)
+    except Exception as error:
+        raise ValueError(f"{name} raised {type(error).__name__}: {error}{where}") from error
+
+
+def field(
+    name: str, value: ArrayLike, size: int, *, least: float | None = None, strict: bool = False, places: Float | None = None
+) -> Float:
     """Return `value` as a read-only float array (size,), a single number being repeated but stored once.
 
-    With `least`, every entry must be at least that, or larger if `strict`.
+    With `least`, every entry must be at least that, or larger if `strict`. `places` (size,) along a rod are for messages.
     """
     given = array(name, value, f"a number or {size} numbers")
     if given.shape not in ((), (size,)):
@@ -98,7 +108,7 @@ def field(name: str, value: ArrayLike, size: int, *, least: float | None = None,
         need = f"finite and {'greater than' if strict else 'at least'} {least:g}"
     if bad.any():
         i = int(np.argmax(bad))
-        raise ValueError(f"{name} must be {need}; got {given[i]} at place {i}")
+        raise ValueError(f"{name} must be {need}; got {given[i]} at {f'place {i}' if places is None else f's = {places[i]:g}'}")
     return given
 
 

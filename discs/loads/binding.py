@@ -35,8 +35,7 @@ class OnRod(ABC):
 
     def _sampled(self, name: str, pattern: Pattern, places: Float, least: float | None = None) -> Float:
         """A pattern at places (m,) along the rod, (m,)."""
-        values = pattern(places.copy()) if callable(pattern) else pattern
-        return checks.field(f"{name} of {self._name}", values, places.size, least=least)
+        return sampled(f"{name} of {self._name}", pattern, places, least)
 
     def _shared(self, chain: Discs, at: float | None, **patterns: Pattern) -> list[Float]:
         """Patterns per length times the shares of the discs, (n,); numbers for the disc nearest to `at`, if that is given."""
@@ -72,6 +71,15 @@ class OnRod(ABC):
     def _push(self, chain: Discs, rows: dict[int, Float], signal: Signal | None) -> Linear:
         """Forces (n,) in rows of q, times a signal."""
         return Linear(drives=(Drive(spread(chain, rows), signal_of(self._name, signal), self._name),))
+
+
+def sampled(name: str, pattern: Pattern, places: Float, least: float | None = None) -> Float:
+    """A pattern at places (m,) along the rod, (m,), all at least `least`. ValueError with its name, and s, if it fails."""
+    if not callable(pattern):
+        return checks.field(name, pattern, places.size, least=least)
+    where = f"; it is given an array of {places.size} places s, from {places.min():g} to {places.max():g}"
+    values = checks.called(name, pattern, places.copy(), where=where)
+    return checks.field(name, values, places.size, least=least, places=places)
 
 
 def given(pattern: Pattern) -> bool:

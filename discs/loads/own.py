@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
@@ -39,12 +40,24 @@ class _Field(Load):
         self.damping = self.stiffness = spread(chain, {})
 
     def potential(self, t: float, q: Float) -> float:
-        return float(self._w @ np.broadcast_to(self._of.V(q[0], q[1]), self._w.shape))
+        values = checks.called("V of Potential", self._of.V, q[0], q[1], where=f" at t = {t:g}")
+        return float(self._w @ self._checked("V", values, q, t))
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         f = np.zeros_like(q)
-        f[0], f[1] = (-self._w * part for part in self._of.gradient(q[0], q[1]))
+        found = checks.called("gradient of Potential", self._of.gradient, q[0], q[1], where=f" at t = {t:g}")
+        if not isinstance(found, tuple | list | np.ndarray) or len(found) != 2:
+            raise ValueError(f"gradient of Potential must return dV/dx and dV/dy; got {checks.shown(found)} at t = {t:g}")
+        f[0], f[1] = (-self._w * self._checked("gradient", part, q, t) for part in found)
         return f
+
+    def _checked(self, name: str, values: ArrayLike, q: Float, t: float) -> Float:
+        """Values (n,), finite where the positions are."""
+        found = checks.array(f"{name} of Potential", values, f"{self._w.size} numbers")
+        if found.shape not in ((), self._w.shape) or (np.isfinite(q).all() and not np.isfinite(found).all()):
+            need = f"{name} of Potential must be finite numbers of shape {self._w.shape}"
+            raise ValueError(f"{need}; got {checks.shown(values)} at t = {t:g}")
+        return np.broadcast_to(found, self._w.shape)
 
 
 @dataclass(frozen=True)
@@ -73,12 +86,15 @@ class _Own(Load):
         self.damping = self.stiffness = spread(chain, {})
 
     def force(self, t: float, q: Float, v: Float) -> Float:
-        found = np.asarray(self._of.force(t, q, v), dtype=float)
+        given = checks.called("force of Custom", self._of.force, t, q, v, where=f" at t = {t:g}")
+        found = checks.array("force of Custom", given, f"numbers of shape {q.shape}")
         if found.shape != q.shape or not np.isfinite(found).all():
             got = f"shape {found.shape}" if found.shape != q.shape else "values that are not finite"
             raise ValueError(f"Custom: the force must be finite numbers of shape {q.shape}; got {got} at t = {t:g}")
         return found
 
     def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
-        power = self._of.power
-        return (super().power(t, q, v)[0] if power is None else float(power(t, q, v))), 0.0
+        if self._of.power is None:
+            return super().power(t, q, v)
+        power = checks.called("power of Custom", self._of.power, t, q, v, where=f" at t = {t:g}")
+        return checks.number(f"power of Custom at t = {t:g}", power), 0.0

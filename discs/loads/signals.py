@@ -157,7 +157,7 @@ def values(signal: Signal, times: Float, name: str) -> Float:
 
 
 def _value(signal: Signal, t: float, name: str) -> float:
-    value = signal(t)
+    value = checks.called(f"{name}: the signal {checks.shown(signal)}", signal, t, where=f" at t = {t:g}")
     if isinstance(value, float):
         return value
     try:

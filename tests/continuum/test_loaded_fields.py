@@ -225,6 +225,12 @@ def test_a_scene_without_loads_computes_none():
         ((Spring(0, 0, -1.0),), r"stiffness of Spring must be at least 0; got -"),
         ((Torque(1.0, lambda t: np.nan),), r"Torque: the signal .* finite numbers; got nan at t = "),
         ((Torque(1.0, lambda t: np.random.default_rng().random()),), r"the signal of Torque must be a function of the time"),
+        (
+            (Torque(1.0, lambda t: np.sqrt(0.3 - t) if t < 0.3 else {}["late"]),),
+            r"Torque: the signal .* raised KeyError: 'late' at t = 0\.5",
+        ),
+        ((Torque(lambda s: 1.0 if s > 1 else 0.0),), r"pattern of Torque 0 raised ValueError: .* an array of \d+ places s, from"),
+        ((Torque(lambda s: np.where(s > 1, np.nan, s)),), r"pattern of Torque 0 must be finite; got nan at s = 1\.0"),
         ((Motor(0.0, at=1.0),), r"Motor: at s = 1 it makes a corner inside the rod.*; drive an end, or take method='richardson'"),
         ((Motor(0.3, at=0.0),), r"Motor: its rate at t = 0 must be the initial omega at s = 0, 0; got 0\.3"),
         ((Motor(signals.pulse(0.5, 0.1), at=3.0),), r"Motor: its rate jumps at t = 0\.5"),

@@ -40,6 +40,16 @@ from tests.discs.test_loads import KINDS
             r"viscosity must be finite, at least 0 and of shape \(1, 8\)",
         ),
         (lambda p: Linear(np.zeros((3, 7)), viscosity=-np.ones((1, 8))), "viscosity must be finite, at least 0"),
+        (lambda p: Torque(1.0, signal=lambda t: 1 / t), "Torque: the signal .* raised ZeroDivisionError: .* at t = 0"),
+        (lambda p: Torque(lambda s: 1 / 0), "pattern of Torque raised ZeroDivisionError: .* 7 places s, from 0 to 3.1"),
+        (lambda p: Torque(lambda s: np.where(s > 3, np.inf, s)), "pattern of Torque must be finite; got inf at s = 3.1"),
+        (lambda p: Custom(lambda t, q, v: {}["wind"]), "force of Custom raised KeyError: 'wind' at t = 0"),
+        (lambda p: Potential(lambda x, y: x, lambda x, y: 1 / 0), "gradient of Potential raised ZeroDivisionError"),
+        (lambda p: Potential(lambda x, y: x, lambda x, y: x), r"gradient of Potential must return dV/dx and dV/dy; got an array"),
+        (
+            lambda p: Potential(lambda x, y: x, lambda x, y: (x, y[:2])),
+            r"gradient of Potential must be finite numbers of shape \(7,\)",
+        ),
         (lambda p: Custom(3), "force and power of Custom must be functions"),
         (lambda p: Potential(lambda x, y: x, None), "gradient of Potential must be a function"),
     ],
@@ -83,6 +93,22 @@ def test_signals_are_what_they_are_called():
     slope = np.diff(signals.smooth(0, 1)(np.linspace(0, 1, 1001)))
     assert (slope >= 0).all()
     assert repr(signals.sine(2.0, 3.0)) == "sine(amplitude=2.0, rate=3.0, phase=0.0)"
+
+
+def test_functions_of_ones_own_that_fail_on_the_way_are_named():
+    problem = uneven(7, KINDS[0])
+
+    def late(value):
+        return lambda t, q, v: value if t < 0.5 else 1 / 0
+
+    for load, words in (
+        (Custom(late(np.zeros((3, 7)))), r"force of Custom raised ZeroDivisionError: .* at t = 0\.5"),
+        (Custom(lambda t, q, v: 0 * q, late(0.0)), r"power of Custom raised ZeroDivisionError: .* at t = 0\.5"),
+        (Custom(lambda t, q, v: 0 * q, lambda t, q, v: v), r"power of Custom at t = 0\.025 must be a finite number"),
+        (Potential(lambda x, y: "low", lambda x, y: (x, y)), "V of Potential must be 7 numbers; got 'low'"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            simulate(replace(problem, loads=(load,)), "midpoint", 0.05, 2, progress=False)
 
 
 def test_compiled_steps_notice_a_time_that_is_not_in_the_table(kernels_as_python):
