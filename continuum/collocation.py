@@ -92,7 +92,7 @@ def step(
     after, v, p = Phase(*map(np.empty_like, before)), np.empty((stages, 3, rod.n)), np.empty((stages, 1, rod.n))
     method, chain = Collocation(rule, sweeps, tolerance), rod.parameters._replace(modes=modes.at(h, rule.pairs))
     if rod.loads:
-        chain = chain._replace(load=chain.load._replace(signals=rod.loads.at(t + h * rule.nodes)))
+        chain = chain._replace(load=rod.loads.stages(t + h * rule.nodes))
     while (cost := step(method, chain, before, after, t, h, v, p))[0] < 0:
         signal.raise_signal(signal.SIGINT)
     return after._replace(pi=after.pi[0]), v, p[:, 0], 0 if cost[2] else cost[0] // stages

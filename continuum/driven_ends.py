@@ -16,12 +16,12 @@ def power(rod: SpectralRod, t: float, h: float, z: Phase, v: Float, p: Float) ->
     assert rod.loads is not None
     rule, held = tableau(len(v)), rod.loads.held
     times = t + h * rule.nodes
-    spent = rod.loads.power(times, v)
+    q = z.hi + z.lo + h * np.tensordot(rule.a, v, 1)
+    spent = rod.loads.power(times, q, v)
     if not held.size:
         return spent, np.empty((len(v), 0))
-    q = z.hi + z.lo + h * np.tensordot(rule.a, v, 1)
     c = rod.basis(q)
-    pull = rod.back(c, rod.mean_force(q) - rod.loads.applied(times, v)) + np.linalg.solve(h * rule.a, p - z.pi)
+    pull = rod.back(c, rod.mean_force(q) - rod.loads.applied(times, q, v)) + np.linalg.solve(h * rule.a, p - z.pi)
     torque = pull[:, held] / c.t[:, held]
     spent[:, 0] += (torque * v[:, 2, held]).sum(axis=1)
     return spent, torque
@@ -32,7 +32,7 @@ def reaction(rod: SpectralRod, t: float, z: Phase) -> Float:
     assert rod.loads is not None
     q, held, now = z.hi + z.lo, rod.loads.held, np.array([t])
     c = rod.basis(q)
-    pull = rod.back(c, rod.mean_force(q) - rod.loads.applied(now, rod.forward(c, z.pi)[None])[0])
+    pull = rod.back(c, rod.mean_force(q) - rod.loads.applied(now, q[None], rod.forward(c, z.pi)[None])[0])
     found: Float = (rod.loads.motors.changes(now)[0] / c.t[held] + pull[held]) / c.t[held]
     return found
 

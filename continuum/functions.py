@@ -1,6 +1,5 @@
 """The functions in which a field is expanded: polynomials between free ends, Fourier series on a closed rod."""
 
-from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -21,7 +20,7 @@ Coefficients: TypeAlias = NDArray[np.floating]  # of polynomials, as NumPy's stu
 
 
 class Derivatives(Protocol):
-    """The matrix (S, n) from values at the nodes to the m-th derivatives of a field at places s (S,); m = 0, 1, 2."""
+    """The matrix (S, n) from values at the nodes, or coefficients, to the m-th derivatives at places s (S,); m = 0, 1, 2."""
 
     def __call__(self, s: Float, m: int = 0, /) -> Float: ...
 
@@ -35,8 +34,7 @@ class Functions(NamedTuple):
     rates : (3 F, n), from values at the nodes to the field and its two derivatives at the finer points.
     project : (n, F + n), from f'' at the finer points and f at the nodes to the coefficients of P f.
     bending : (n,); int |r''|^2 is the sum of this times |coefficient|^2. torsion : (n, n), the matrix of int theta'^2.
-    line : from places (S,) to the matrix (S, n) that takes coefficients to values there.
-    field : see `Derivatives`.
+    line, field : see `Derivatives`; those of the line take coefficients.
     ends : number of leading coefficients that are r at the ends.
     """
 
@@ -49,7 +47,7 @@ class Functions(NamedTuple):
     project: Float
     bending: Float
     torsion: Float
-    line: Callable[[Float], Float]
+    line: Derivatives
     field: Derivatives
     ends: int
 
@@ -90,12 +88,15 @@ def polynomials(n: int, density: Density) -> Functions:
     def value(xi: Float, functions: Coefficients) -> Float:
         return (legendre.legvander(xi, len(functions) - 1) @ functions).astype(np.float64, copy=False)
 
-    def line(s: Float) -> Float:
-        return np.column_stack([1 - s / length, s / length, value(density.coordinate(s), zeroth) - np.outer(s, tilt)])
-
     def slope(xi: Float) -> Float:
         ends = np.full(xi.size, 1 / length)
         return np.column_stack([-ends, ends, value(xi, first) - tilt])
+
+    def line(s: Float, m: int = 0) -> Float:
+        xi = density.coordinate(s)
+        if m == 0:
+            return np.column_stack([1 - s / length, s / length, value(xi, zeroth) - np.outer(s, tilt)])
+        return slope(xi) if m == 1 else np.hstack([np.zeros((s.size, 2)), value(xi, second)])
 
     def field(s: Float, m: int = 0) -> Float:
         xi = density.coordinate(s)
@@ -219,8 +220,8 @@ def weighted(given: Functions, rod: Rod) -> Functions:
     bends[:, first:] = bends[:, first:] @ back.T
     twist = given.rates[finer : 2 * finer]
 
-    def line(s: Float) -> Float:
-        values = given.line(s)
+    def line(s: Float, m: int = 0) -> Float:
+        values = given.line(s, m)
         values[:, first:] = values[:, first:] @ back.T
         return values
 

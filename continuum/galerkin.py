@@ -253,8 +253,9 @@ class SpectralRod(SkewGradient):
         return self.forward(bases, p)
 
     def pulls(self, bases: Basis, shape: Float, t: Float, z: Phase, moves: Float, p: Float) -> Float:
-        gradient = self.mean_force(shape + moves)
-        return self.back(bases, gradient if self.loads is None else gradient - self.loads.force(t, self.forward(bases, p)))
+        q = shape + moves
+        gradient = self.mean_force(q)
+        return self.back(bases, gradient if self.loads is None else gradient - self.loads.force(t, q, self.forward(bases, p)))
 
     def potential(self, shape: Float) -> float:
         return float(self._potentials(shape))
@@ -266,13 +267,11 @@ class SpectralRod(SkewGradient):
         out = secant * self.bending
         out[..., 2, :] = secant[..., 2, :] @ self.torsion + self.twist
         if self.loads:
-            out -= self.loads.constant
-            if self.loads.stiffness.size:
-                out[..., :2, :] += secant[..., :2, :] @ self.loads.stiffness
+            out += self.loads.gradient(secant)
         return out
 
-    def modes(self, c: Basis) -> Modes | Pencil:
-        """The eigenvectors of C^T (grad^2 V) C. With them (I + g C^T (grad^2 V) C)^-1 takes two matrix products for any g.
+    def modes(self, c: Basis, t: float = 0.0) -> Modes | Pencil:
+        """The eigenvectors of C^T (grad^2 V) C at the time t; with them (I + g C^T (grad^2 V) C)^-1 takes two matrix products.
 
         Damping has other eigenvectors: a `Pencil` then has both matrices.
         """
@@ -282,8 +281,8 @@ class SpectralRod(SkewGradient):
         moves[:, points:] = np.diag(c.e)
         xy = np.hstack([moves.real @ self._project, moves.imag @ self._project]).reshape(n, 2, n)
         bent = (xy * self.bending).reshape(n, 2 * n) @ xy.reshape(n, 2 * n).T
-        if self.loads and self.loads.stiffness.size:
-            bent += (xy @ self.loads.stiffness).reshape(n, 2 * n) @ xy.reshape(n, 2 * n).T
+        if self.loads:
+            bent += self.loads.stiffened(xy, t)
         stiffness = c.t[:, None] * (bent + self.torsion) * c.t
         if self.loads and (damping := self.loads.matrix).size:
             return Pencil(stiffness, c.t[:, None] * damping * c.t)
@@ -291,4 +290,4 @@ class SpectralRod(SkewGradient):
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 
     def solve(self, secant: Float, c: Basis, g: complex, rhs: Float, d: complex = 0.0, t: float = 0.0, q: Any = None) -> Float:
-        return self.modes(c).solve(d, g, rhs)
+        return self.modes(c, t).solve(d, g, rhs)

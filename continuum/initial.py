@@ -77,13 +77,17 @@ class Resolved:
         return (self.pieces[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
     def twist(self, edges: Float, order: int) -> Float:
-        """theta' at the places of Gauss quadrature with `order` points on pieces, of these or parts of them, (P order,)."""
+        """theta' as `derivative` has it."""
+        return self.derivative("theta", edges, order)
+
+    def derivative(self, name: str, edges: Float, order: int, m: int = 1) -> Float:
+        """The m-th derivative of a field at the places of Gauss quadrature on pieces, of these or parts of them, (P order,)."""
         x, w = legendre.leggauss(order)
         half = np.diff(edges)[:, None] / 2
         s = (edges[:-1, None] + half * (1 + x)).ravel()
         expand = (legendre.legvander(x, order - 1) * w[:, None]).T * (np.arange(order) + 0.5)[:, None]
-        theta = self.fields(s)["theta"].reshape(-1, order) @ expand.T
-        found: Float = (theta @ legendre.legder(np.eye(order)).T @ legendre.legvander(x, order - 2).T / half).ravel()
+        field = self.fields(s)[name].reshape(-1, order) @ expand.T
+        found: Float = (field @ legendre.legder(np.eye(order), m).T @ legendre.legvander(x, order - 1 - m).T / half**m).ravel()
         return found
 
 

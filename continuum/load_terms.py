@@ -19,12 +19,13 @@ X, Y, ROLL, TWIST = range(4)  # what a force acts on: x, y, theta, theta'
 
 
 class Drive(NamedTuple):
-    """A force that a signal multiplies: on x, y, theta and theta' at places, (4, S). strain : as in `Terms`, of a rest twist."""
+    """A force that a signal multiplies: on x, y, theta and theta' at places, (4, S). strain, curvature : as in `Terms`."""
 
     push: Float
     signal: Signal
     name: str
     strain: Float | float = 0.0
+    curvature: Float | float = 0.0
 
 
 @dataclass(eq=False)
@@ -35,6 +36,7 @@ class Terms:
     push : (4, S), constant forces on x, y, theta, theta', with a potential.
     damping : (2, S), on omega and omega'. stiffness : (S,), of springs. offset : energy.
     strain : (S,), the constant rest twist times sqrt(beta w); the square of the sum of rest twists is part of the energy.
+    curvature : (S,), the constant rest curvature.
     """
 
     scene: Scene
@@ -44,13 +46,15 @@ class Terms:
     damping: Float = field(init=False)
     stiffness: Float = field(init=False)
     strain: Float = field(init=False)
+    curvature: Float = field(init=False)
     offset: float = 0.0
     drives: list[Drive] = field(default_factory=list)
     axles: list[Axle] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         n = self.s.size
-        self.push, self.damping, self.stiffness, self.strain = np.zeros((4, n)), np.zeros((2, n)), np.zeros(n), np.zeros(n)
+        self.push, self.damping = np.zeros((4, n)), np.zeros((2, n))
+        self.stiffness, self.strain, self.curvature = np.zeros((3, n))
 
     def at(self, load: OnRod, name: str, least: float | None = None) -> Float:
         """A pattern at the places, (S,)."""
@@ -74,12 +78,12 @@ class Terms:
             raise ValueError(f"{name}: about={load.about!r} is for rods with headings of their own; here they follow the line")
         return ROLL
 
-    def drive(self, load: Any, rows: dict[int, Float], strain: Float | float = 0.0) -> None:
+    def drive(self, load: Any, rows: dict[int, Float], strain: Float | float = 0.0, curvature: Float | float = 0.0) -> None:
         push = np.zeros((4, self.s.size))
         for row, values in rows.items():
             push[row] = values
         name = type(load).__name__
-        self.drives.append(Drive(push, signal_of(name, load.signal), name, strain))
+        self.drives.append(Drive(push, signal_of(name, load.signal), name, strain, curvature))
 
 
 @singledispatch
@@ -90,10 +94,9 @@ def add(load: Any, to: Terms) -> None:
 def check_taken(loads: tuple[OnRod, ...]) -> None:
     """ValueError for a load that has no form, or a part without one."""
     for load in loads:
-        name = type(load).__name__
-        parts = [part for part in ("curvature", "bending") if given(getattr(load, part, 0.0))]
-        if parts or add.dispatch(type(load)) is add.dispatch(object):
-            what = f"{name}({parts[0]}=...)" if parts else name
+        bending = given(getattr(load, "bending", 0.0))
+        if bending or add.dispatch(type(load)) is add.dispatch(object):
+            what = f"{type(load).__name__}{'(bending=...)' * bending}"
             raise ValueError(
                 f"{what}: the spectral solver has no form of it; take method='richardson', or simulate(lump(scene, n))"
             )
@@ -154,9 +157,10 @@ def _(load: Damping, to: Terms) -> None:
 def _(load: Rest, to: Terms) -> None:
     _refuse_headings(load, "stretch", "shear", "mounting_angle")
     root = np.sqrt(to.scene.rod.at(to.s).torsion_stiffness * to.w)
-    strain = root * to.at(load, "twist")
+    strain, curvature = root * to.at(load, "twist"), to.at(load, "curvature")
     if load.signal is None:
         to.push[TWIST] += root * strain
         to.strain += strain
+        to.curvature += curvature
     else:
-        to.drive(load, {TWIST: root * strain}, strain)
+        to.drive(load, {TWIST: root * strain}, strain, curvature)

@@ -32,6 +32,7 @@ from continuum.rod import Scene
 from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
 from discs import SimulationError, Solution
 from discs.arrays import Float
+from discs.loads.binding import given
 from discs.running.stats import Stats
 from discs.skew import Phase
 
@@ -144,7 +145,8 @@ def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
 
 def bent_hint(scene: Scene) -> str:
     """A hint for scenes that start bent at a free end, which violates the end condition x'y'' = y'x''; empty for others."""
-    if scene.closed or not scene.rod.bending_stiffness or not scene.rod.radius:
+    curved = any(given(getattr(load, "curvature", 0.0)) for load in scene.loads)  # the end may have a curvature then
+    if scene.closed or curved or not scene.rod.bending_stiffness or not scene.rod.radius:
         return ""
     length = scene.rod.length
     d = 1e-4 * length

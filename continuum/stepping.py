@@ -137,7 +137,8 @@ class Steps:
         while True:
             if fresh:
                 c = self.rod.basis(z.hi + z.lo)
-                self._modes = self.rod.modes(self.rod.basis(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi)))
+                middle = self.rod.basis(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi))
+                self._modes = self.rod.modes(middle, t + 0.5 * h)
             after, v, p, taken = self._sweep(t, z, h)
             if fresh:
                 self._usual, self._excess = taken, 0

@@ -6,6 +6,7 @@ Admissible variations are (e psi, psi). Loads add their virtual work to d'Alembe
     slope             rho g . e psi                spring            -kappa (r - r_a) . e psi
     rolling damping   -c omega psi                 torsional viscosity   -eta omega' psi'
     rest twist tau_0  beta tau_0 psi'              from beta (theta' - tau_0)^2/2
+    rest curvature: see `continuum.curved`
 
 As for the elastic forces, e psi is replaced by P(e psi), which the functions can form. Then the virtual work is f . C delta for
 forces f on the coordinates: with the functions phi_k of the line and psi_k of theta
@@ -40,9 +41,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
+from continuum.curved import Curved, forces, product
 from continuum.functions import Functions
 from continuum.initial import Resolved
-from continuum.kernels.spectral_load import Load
+from continuum.kernels.spectral_load import NONE, Load
 from continuum.load_places import cut_patterns, point_loads
 from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken
 from continuum.motors import Motors
@@ -59,6 +61,7 @@ class Weak(NamedTuple):
     constant : (3, n), forces with a potential. damping : (n, n), D on omega. stiffness : (n, n), of the springs on x and on y.
         Both are (0, 0) if there are none.
     drives : (L, 3, n). signals, names : of the drives. closing (L,), squares (L, L + 1) : energies of rest twists, see `driven`.
+    curved : rest curvature; None for none.
     energy : the energy of the loads with a potential, for the initial fields.
     timing : the pieces of the signals.
     motors : the motors. held : (motors,), their nodes.
@@ -72,6 +75,7 @@ class Weak(NamedTuple):
     names: tuple[str, ...]
     closing: Float
     squares: Float
+    curved: Curved | None
     energy: float
     timing: Timing
     motors: Motors
@@ -93,7 +97,12 @@ class Weak(NamedTuple):
         motors = np.zeros((self.held.size, *self.constant.shape))
         motors[np.arange(self.held.size), 2, self.held] = HELD
         patterns = np.concatenate([self.constant[None], self.drives, motors])
-        return Load(patterns.reshape(len(patterns), -1), np.empty((0, len(patterns))), self.matrix, self.stiffness)
+        return NONE._replace(patterns=patterns.reshape(len(patterns), -1), damping=self.matrix, stiffness=self.stiffness)
+
+    def stages(self, t: Float) -> Load:
+        """The parameters for a step with stages at the times (s,)."""
+        load = self.parameters._replace(signals=self.at(t))
+        return load if self.curved is None else load._replace(bent=self.curved.matrices(self.values(t)))
 
     def at(self, t: Float) -> Float:
         """The signals of the compiled form at the times of stages (s,)."""
@@ -104,32 +113,62 @@ class Weak(NamedTuple):
         found = [signals.values(f, t, name) for f, name in zip(self.signals, self.names, strict=True)]
         return np.stack(found, axis=1) if found else np.empty((t.size, 0))
 
-    def driven(self, t: Float, q: Float) -> Float:
-        """The part of the energy that depends on time, at times (m,) and changes of the positions (m, 3, n)."""
-        rest = self.squares.any(axis=1)
-        if not rest.any():
-            return np.zeros(t.size)
-        values = self.values(t)
-        strain = 0.5 * values @ self.squares[:, :-1] + self.squares[:, -1] - np.einsum("lin,min->ml", self.drives, q) - self.closing
-        total: Float = (values * strain)[:, rest].sum(axis=1)
+    def gradient(self, q: Float) -> Float:
+        """That of the potential of the loads, (..., 3, n)."""
+        out = np.broadcast_to(-self.constant, q.shape).copy()
+        if self.stiffness.size:
+            out[..., :2, :] += q[..., :2, :] @ self.stiffness
+        if self.curved is not None:
+            out[..., :2, :] -= forces(self.curved.rest, q)
+        return out
+
+    def stiffened(self, xy: Float, t: float) -> Float | float:
+        """The matrix (m, m) of the second variation of the potential, at a time, for moves (m, 2, n) of the line."""
+        total: Float | float = 0.0
+        if self.stiffness.size:
+            total = np.einsum("irk,jrk->ij", xy @ self.stiffness, xy)
+        if self.curved is not None:
+            total = total + product(self.curved.matrices(self.values(np.array([t])))[0], xy)
         return total
 
-    def power(self, t: Float, v: Float) -> Float:
-        """The rates of work and dissipation at times (m,) and rates (m, 3, n), (m, 2), without those of motors."""
+    def driven(self, t: Float, q: Float) -> Float:
+        """The part of the energy that depends on time, at times (m,) and changes of the positions (m, 3, n)."""
+        bent = np.zeros(t.size)
+        if self.curved is not None and self.curved.parts:
+            bent = self.curved.energies(self.values(t), q) - self.curved.energies(np.zeros((t.size, len(self.signals))), q)
+        rest = self.squares.any(axis=1)
+        if not rest.any():
+            return bent
+        values = self.values(t)
+        strain = 0.5 * values @ self.squares[:, :-1] + self.squares[:, -1] - np.einsum("lin,min->ml", self.drives, q) - self.closing
+        total: Float = bent + (values * strain)[:, rest].sum(axis=1)
+        return total
+
+    def power(self, t: Float, q: Float, v: Float) -> Float:
+        """The rates of work and dissipation at times (m,), positions and rates (m, 3, n), (m, 2), without those of motors."""
         work = (self.values(t) * np.einsum("lin,min->ml", self.drives, v)).sum(axis=1)
+        if self.curved is not None:
+            work = work + (self._bent(t, q) * v[:, :2]).sum(axis=(1, 2))
         omega = v[:, 2]
         lost = (omega @ self.damping * omega).sum(axis=1) if self.damping.size else np.zeros(t.size)
         return np.stack([work, lost], axis=1)
 
-    def force(self, t: Float, v: Float) -> Float:
-        """The forces without a potential, and dampers in the place of motors, at times (m,) and rates (m, 3, n), (m, 3, n)."""
-        f = self.applied(t, v)
+    def _bent(self, t: Float, q: Float) -> Float:
+        """The forces of rest curvatures less those of the constant one, (m, 2, n)."""
+        assert self.curved is not None
+        return forces(self.curved.matrices(self.values(t)) - self.curved.rest, q)
+
+    def force(self, t: Float, q: Float, v: Float) -> Float:
+        """The forces without a potential, and dampers in the place of motors, at times (m,), positions, rates (m, 3, n)."""
+        f = self.applied(t, q, v)
         f[:, 2, self.held] += HELD * (self.motors.rates(t) - v[:, 2, self.held])
         return f
 
-    def applied(self, t: Float, v: Float) -> Float:
-        """The forces without a potential and those of motors, at times (m,) and rates (m, 3, n), (m, 3, n)."""
+    def applied(self, t: Float, q: Float, v: Float) -> Float:
+        """The forces without a potential and those of motors, at times (m,), positions and rates (m, 3, n), (m, 3, n)."""
         f: Float = np.einsum("ml,lin->min", self.values(t), self.drives)
+        if self.curved is not None:
+            f[:, :2] += self._bent(t, q)
         if self.damping.size:
             f[:, 2] -= v[:, 2] @ self.damping
         return f
@@ -170,9 +209,16 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
         0.5 * terms.stiffness @ (start["x"] ** 2 + start["y"] ** 2) - terms.push[X] @ start["x"] - terms.push[Y] @ start["y"]
     )
     terms.push[:2] -= terms.stiffness * straight
+    curved, bent, constant = _curved(terms, functions), 0.0, project(terms.push)
+    if curved is not None:  # `bent`: of the initial fields
+        constant[:2] -= curved.split()
+        z, z1 = (initial.derivative("x", edges, order, m) + 1j * initial.derivative("y", edges, order, m) for m in (1, 2))
+        size, kappa = len(z), terms.curvature[: len(z)]
+        stiff = terms.w[:size] * scene.rod.at(s[:size]).bending_stiffness
+        bent = float(stiff @ (0.5 * np.abs(kappa * z) ** 2 - kappa * (z.conj() * z1).imag))
     timing, places = Timing(scene), [np.array([float(axle.at)]) for axle in terms.axles]
     return Weak(
-        constant=project(terms.push),
+        constant=constant,
         damping=(theta.T * terms.damping[0]) @ theta + (slope.T * terms.damping[1]) @ slope if terms.damping.any() else none,
         stiffness=(line.T * terms.stiffness) @ line if terms.stiffness.any() else none,
         drives=np.array([project(drive.push) for drive in terms.drives]).reshape(-1, 3, n),
@@ -180,8 +226,20 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
         names=tuple(drive.name for drive in terms.drives),
         closing=np.array([drive.push[TWIST] @ twisted for drive in terms.drives]),
         squares=strains @ np.vstack([strains, terms.strain]).T,
-        energy=terms.offset + float(line_energy + 0.5 * terms.strain @ terms.strain - terms.push[TWIST] @ twisted),
+        curved=curved,
+        energy=terms.offset + bent + float(line_energy + 0.5 * terms.strain @ terms.strain - terms.push[TWIST] @ twisted),
         timing=timing,
         motors=Motors(terms.axles, timing, scene.duration, np.array([initial.fields(at)["omega"][0] for at in places])),
         held=np.array([0 if axle.at == 0 else n - 1 for axle in terms.axles], dtype=int),
     )
+
+
+def _curved(terms: Terms, functions: Functions) -> Curved | None:
+    """The rest curvature of the loads; None for none."""
+    kappas = [terms.curvature, *(0 * terms.s + drive.curvature for drive in terms.drives)]
+    parts = [i for i, kappa in enumerate(kappas[1:]) if kappa.any()]
+    if not parts and not kappas[0].any():
+        return None
+    weights = terms.w * terms.scene.rod.at(terms.s).bending_stiffness
+    slope, bend, mean = functions.line(terms.s, 1), functions.line(terms.s, 2), complex(*terms.scene.shift) / terms.scene.rod.length
+    return Curved.of(np.array([kappas[0], *(kappas[1 + i] for i in parts)]), parts, weights, slope, bend, mean)

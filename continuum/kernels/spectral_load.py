@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discs.arrays import Float
+from discs.arrays import Complex, Float
 from discs.kernels.compiled import part
 
 
@@ -12,17 +12,19 @@ class Load(NamedTuple):
     """Parameters of the loads; arrays have no entries where there are none.
 
     patterns : (L, 3 n), forces. signals : (s, L), their signals at the stages, set before each step; 1 for forces with a potential.
-    damping : (n, n), on omega. stiffness : (n, n), of springs, on x and on y.
+    damping : (n, n), on omega. stiffness : (n, n), of springs, on x and on y. bent : (s, n, n + 1), of rest curvature at the
+    stages, see `continuum.curved.Curved.matrices`, set before each step.
     """
 
     patterns: Float
     signals: Float
     damping: Float
     stiffness: Float
+    bent: Complex
 
 
 _EMPTY = np.empty((0, 0))
-NONE = Load(_EMPTY, _EMPTY, _EMPTY, _EMPTY)
+NONE = Load(_EMPTY, _EMPTY, _EMPTY, _EMPTY, np.empty((0, 0, 0), complex))
 
 
 @part(_nrt=True)
@@ -41,4 +43,13 @@ def press(load, work, moves, omega):
                 held = np.dot(work[row] + moves[i, row], load.stiffness)
                 for k in range(n):
                     f[i, row, k] -= held[k]
+    if load.bent.shape[0]:
+        a = np.ones(n + 1, np.complex128)
+        for i in range(s):
+            for k in range(n):
+                a[k] = complex(work[0, k] + moves[i, 0, k], work[1, k] + moves[i, 1, k])
+            held = np.dot(load.bent[i], a)
+            for k in range(n):
+                f[i, 0, k] -= held[k].real
+                f[i, 1, k] -= held[k].imag
     return f

@@ -175,11 +175,11 @@ def _begin(chain: Any, work: Any, method: Collocation, room: Room, before: Phase
     do.stiffness(chain, work, move, c, stiff)
     t = room.times[rule.b.size // 2]
     for j in range(rule.real.size):
-        d = h * rule.real[j]
-        do.precondition(chain, stiff, before, t, move, c, d, d * d, do.pick(chain, own.single, j))
+        value, matrix = rule.real[j], do.pick(chain, own.single, j)
+        do.precondition(chain, stiff, before, t, move, c, h * value, h * h * value**2, matrix)
     for j in range(rule.pairs.size):
-        z = h * rule.pairs[j]
-        do.precondition(chain, stiff, before, t, move, c, z, z * z, do.pick(chain, own.double, j))
+        pair, factors = rule.pairs[j], do.pick(chain, own.double, j)
+        do.precondition(chain, stiff, before, t, move, c, h * pair, h * h * pair**2, factors)
     for i in range(rule.b.size):
         forward(c, before.pi, room.v[i])
 

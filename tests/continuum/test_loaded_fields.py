@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from continuum import Rod, Scene, breathing_ring, solve, untwisting_rod
 from continuum.balance import balances
@@ -24,8 +25,8 @@ EVERYTHING = (
     Slope(gx=0.1, gy=-0.2),
     Spring(lambda s: s, 0.1, 0.3),
     Spring(0.0, 0.0, 0.4, at=3.0),
-    Rest(twist=lambda s: 0.2 * s, signal=SMOOTH),
-    Rest(twist=0.1),
+    Rest(twist=lambda s: 0.2 * s, curvature=0.2, signal=SMOOTH),
+    Rest(twist=0.1, curvature=lambda s: 0.2 * np.sin(np.pi * s / 3) ** 4),  # the straight rod fits it at the ends
 )
 
 
@@ -154,6 +155,38 @@ def test_steps_do_not_jump_over_a_signal(signal, area):
     assert run.stats["steps"] < 80
 
 
+def test_a_free_end_has_its_rest_curvature_and_a_known_stretch(rolling):
+    """At both ends: |r'| = exp(-R kappa_0 dtheta) by the field law, 1 - R kappa_0 dtheta by the unit law, from a rod on an arc."""
+    kappa = 0.4
+
+    def initial(s):
+        return np.sin(kappa * s) / kappa, (1 - np.cos(kappa * s)) / kappa, -0.9 * np.cos(np.pi * s / ROD.length), 0 * s
+
+    run = field(Scene(rod=ROD, initial=initial, duration=1.5, rolling=rolling, loads=(Rest(curvature=kappa),)), 1e-8, 3)
+    line = CubicSpline(run.s, run.x[-1] + 1j * run.y[-1])
+    turned = ROD.radius * kappa * (run.theta[-1] - run.theta[0])[[0, -1]]
+    z, bend = line(run.s[[0, -1]], 1), line(run.s[[0, -1]], 2)
+    assert np.abs(z) == pytest.approx(np.exp(-turned) if rolling == "field" else 1 - turned, abs=2e-6)
+    assert (z.conj() * bend).imag / np.abs(z) ** 2 == pytest.approx(kappa, abs=1e-3)
+    assert np.abs(turned).min() > 0.2
+    assert np.abs(run.energy - run.energy[0]).max() < 1e-10
+
+
+def test_a_rod_on_the_arc_of_its_rest_curvature_stays_there(rolling):
+    """Closed too, a ring of its own radius; both without energy."""
+    a = ROD.length / (2 * np.pi)
+
+    def ring(s):
+        return a * np.cos(s / a), a * np.sin(s / a), 0 * s, 0 * s
+
+    scene = Scene(rod=ROD, initial=ring, duration=1.0, rolling=rolling, closed=True, loads=(Rest(curvature=1 / a),))
+    for given in (scene, replace(scene, closed=False)):
+        run = field(given, 1e-8)
+        assert np.abs(run.x - run.x[0]).max() < 1e-8
+        assert np.abs(run.theta).max() < 1e-8
+        assert np.abs(run.energy).max() < 1e-8  # of 3.3: second derivatives of the initial fields lose digits
+
+
 @pytest.mark.parametrize("compiled", [True, False])
 def test_energy_is_balanced(rolling, compiled):
     """All loads at once, at the ends of steps to the tolerance of sweeps; and the two engines agree."""
@@ -176,7 +209,7 @@ def test_the_energy_at_the_start_has_that_of_the_loads():
     run = Runner(replace(untwisting_rod(**UNEVEN, duration=1.0), loads=EVERYTHING), np.array([0.0]), 4).run(19, 1e-4)
     s = np.linspace(0, 3, 200_001)
     slope = np.pi**2 / 6 * np.sin(np.pi * s / 3)  # theta' of theta = -pi/2 cos(pi s/3)
-    density = 0.45 * (slope - 0.1) ** 2 - 1.3 * 0.1 * s + 0.15 * 0.1**2
+    density = 0.25 * (0.2 * np.sin(np.pi * s / 3) ** 4) ** 2 + 0.45 * (slope - 0.1) ** 2 - 1.3 * 0.1 * s + 0.15 * 0.1**2
     assert run.rod.start_energy == pytest.approx(np.trapezoid(density, s) + 0.2 * 9, rel=1e-9)
 
 
@@ -219,7 +252,6 @@ def test_a_scene_without_loads_computes_none():
         ((Torque(1.0, about="turn"),), r"about='turn' is for rods with headings of their own"),
         ((Damping(turning=1.0),), r"turning is for rods with headings of their own"),
         ((Damping(rolling=-1.0),), r"rolling of Damping must be .*at least 0"),
-        ((Rest(curvature=1.0),), r"Rest\(curvature=...\): the spectral solver has no form of it; take method='richardson'"),
         ((Damping(bending=1.0),), r"Damping\(bending=...\): the spectral solver has no form of it"),
         ((Rest(shear=1.0),), r"shear is for rods with headings of their own"),
         ((Spring(0, 0, -1.0),), r"stiffness of Spring must be at least 0; got -"),
