@@ -217,7 +217,7 @@ class Search:
         last, failure = None, None
         for n, fewer in zip(sizes, (sizes[0], *sizes), strict=False):
             # changes fall ever faster once a motion is resolved: at most as if by the square of the last ratio
-            if n in MORE and self._change * self._ratio ** (2 * len(sizes[sizes.index(n) :])) > 1:
+            if n in MORE and self._change * min(self._ratio, 1.0) ** (2 * len(sizes[sizes.index(n) :])) > 1:
                 break
             try:
                 found = self._run(n, tolerance)
