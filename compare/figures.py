@@ -26,6 +26,7 @@ KIND = {
     "ring": "ring",
     "own": "own headings",
 }
+LAW = {"field": "field law", "unit": "unit law", "own": "own headings"}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
 
 
@@ -202,7 +203,7 @@ def precision(study: WorkPrecision) -> list[Axes]:
                     seconds, errors, marks.get(method, "."), linestyle="-", color="#999999", markersize=4, linewidth=0.8
                 )[0]
             shown.setdefault(method, line)
-        ax.set_title(f"{name}, N = {n}", fontsize="medium")
+        ax.set_title(f"{LAW.get(name, name)}, N = {n}", fontsize="medium")
         ax.grid(alpha=0.3)
     for ax in grid[-1]:
         ax.set_xlabel("wall time (s)")

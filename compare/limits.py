@@ -2,7 +2,7 @@
 
 import csv
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +74,7 @@ def towards_unit_law(shear: tuple[float, ...] = FAMILY, tol: float = 1e-4) -> Di
 def from_the_paper(tol: float = 1e-3) -> list[Distances]:
     """Distances of steered rods from the paper's two laws at the end: the models differ and do not tend to these laws."""
     family = [(0.0, 160.0, 1 / 160), (1.0, 10.0, 0.05), (10.0, 10.0, 0.25), (100.0, 100.0, 0.05)]
-    laws = [("field law, the paper's", "field"), ("unit law, the paper's", "unit")]
+    laws = [("the paper's rod, field law", "field"), ("the paper's rod, unit law", "unit")]
     return [distances(name, family, solve(untwisting_rod(law), tol, frames=1, progress=False), tol) for name, law in laws]
 
 
@@ -132,7 +132,8 @@ def limits(
 def _draw(study: Study, unit: Distances, paper: list[Distances], reach: Float) -> Figure:
     figure = Figure(figsize=(10, 7.8), layout="constrained")
     axes = figure.subplots(2, 2)
-    figures.convergence([study], axes[0, 0])
+    figures.convergence([replace(study, ends="own")], axes[0, 0])
+    axes[0, 0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0, 0.12))
     axes[0, 0].set_title("(a) N discs against the field, A = G = 10, J = 0.25")
     for j, (symbol, line) in enumerate(zip(("x", "y", "θ"), ("o-", "s--", "^:"), strict=True)):
         axes[0, 1].loglog(unit.shear, unit.distance[:, j], line, color=BLUE, label=symbol)
@@ -155,7 +156,7 @@ def _draw(study: Study, unit: Distances, paper: list[Distances], reach: Float) -
             np.arange(len(kinds)) + shift, np.hypot(d.distance[:, 0], d.distance[:, 1]), 0.34, color=colour, label=d.against
         )
     axes[1, 1].set_yticks(np.arange(len(kinds)), kinds)
-    axes[1, 1].set(xlabel="distance of centre lines at t = 4.5 (length)", title="(d) against the paper's rod")
+    axes[1, 1].set(xlabel="distance of centre lines at t = 4.5 (length)", title="(d) from the paper's rod")
     for ax in axes.flat[1:]:
         ax.grid(alpha=0.3, which="both" if ax is not axes[1, 1] else "major")
         ax.legend(fontsize=8)

@@ -5,9 +5,22 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from compare.hardcases.problems import collapse, folding, lumped, parasite, rough, rounding, torsion_wave, twisted, waves
-from compare.hardcases.runs import CONSERVING, FIXED, GAUSS, OURS, PEERS, Expectation, Found, motion
+from compare.hardcases.problems import (
+    collapse,
+    every_other,
+    folding,
+    loaded,
+    lumped,
+    parasite,
+    rough,
+    rounding,
+    torsion_wave,
+    twisted,
+    waves,
+)
+from compare.hardcases.runs import CONSERVING, FIXED, GAUSS, OURS, PEERS, TAKE_LOADS, Expectation, Found, motion
 from discs import Problem
+from discs.loads import Damping, Motor, OnRod, Rest, Slope, Torque, signals
 
 
 @dataclass(frozen=True)
@@ -140,6 +153,12 @@ def cases(quick: bool = False) -> list[Case]:
         run = partial(rounding, partial(twisted, n, duration=0.5 if quick else 4.5), 0.01)
         add("rounding", f"N = {n}", what, exactly(words, energy=1e-9, error=1e-6), run, methods=(*FIXED, *PEERS))
 
+    for setting, (what, n, loads) in LOADED.items():
+        words = "energy less work and dissipation is constant to 1e-10, of the largest of the three"
+        run = partial(motion, partial(loaded, n, *loads), compared=False)
+        able = tuple(m for m in TAKE_LOADS if m != "rk4" or not any(isinstance(load, Motor) for load in loads))
+        add("loads", f"{setting}, N = {n}", what, exactly(words, energy=1e-10), run, methods=able)
+
     run = partial(motion, partial(twisted, 65, duration=9.0, twist=1.0), note=folding)
     words = "the equations remain valid: energy to 1e-10 (real discs would touch, see discs.mechanics.contact)"
     add(
@@ -152,6 +171,38 @@ def cases(quick: bool = False) -> list[Case]:
     return found
 
 
+LOADED: dict[str, tuple[str, int, tuple[OnRod, ...]]] = {
+    "stiff damping": (
+        "damping rates of 1e6, far above one over the step",
+        33,
+        (Damping(rolling=30.0, torsion=1e3),),
+    ),
+    "resonance": (
+        "a torque at the frequency of the longest torsion wave, 0.5 rad a unit of time",
+        33,
+        (Torque(0.5, signals.sine(1.0, 0.5), at=0.0),),
+    ),
+    "a motor that reverses": (
+        "the rate of the first disc is prescribed; it changes its sign five times",
+        17,
+        (Motor(signals.sine(1.0, 4.0), at=0.0),),
+    ),
+    "a fast signal": (
+        "a torque that changes its sign several times within a step",
+        33,
+        (Torque(3.0, signals.sine(1.0, 300.0), at=0.0),),
+    ),
+    "an actuator at the mesh's wave length": (
+        "the rest twist of neighbouring links has opposite signs, and oscillates",
+        33,
+        (Rest(twist=partial(every_other, k=4 / 32), signal=signals.sine(1.0, 20.0)),),
+    ),
+    "strong slope": (
+        "the rod falls over twenty of its lengths",
+        33,
+        (Slope(gx=10.0, gy=-5.0),),
+    ),
+}
 EXTREMES: dict[str, tuple[str, dict[str, Any]]] = {
     "α = 1e-9": ("untwisting_rod", {"spin_inertia": 1e-9}),
     "α = 0": ("untwisting_rod", {"spin_inertia": 0.0}),

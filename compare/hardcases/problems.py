@@ -18,6 +18,7 @@ from continuum.exact import ring, standing_wave
 from continuum.scenes import SCENES
 from discs import Leapfrog, Problem, Solution, State
 from discs.arrays import Float
+from discs.loads import OnRod
 from discs.running.time_loop import March
 from discs.simulation import lost_energy
 
@@ -32,6 +33,16 @@ def twisted(n: int, ends: str = "springs", **keywords: Any) -> Problem:
 def lumped(scene: str, n: int, **keywords: Any) -> Problem:
     """A named scene, lumped."""
     return lump(SCENES[scene](**keywords), n)
+
+
+def loaded(n: int, *loads: OnRod, ends: str = "springs", **keywords: Any) -> Problem:
+    """The paper's twist with loads, lumped."""
+    return lump(replace(untwisting_rod(**keywords), loads=loads), n, ends)
+
+
+def every_other(s: Float, k: float) -> Float:
+    """1 and -1 in turns at the middles s of links of length k."""
+    return np.cos(np.pi * (s / k - 0.5))
 
 
 def rough(n: int, duration: float) -> Problem:

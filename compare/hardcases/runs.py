@@ -21,6 +21,7 @@ from discs.simulation import ENERGY_DRIFT_WARNING
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")
+TAKE_LOADS = (*CONSERVING, *GAUSS, "rk4", "auto", "default")  # loads that do work
 FIXED = (*CONSERVING, *GAUSS, *EXPLICIT)  # methods with a fixed step: a tolerance hides waves and rounding
 OURS = (*FIXED, "auto", "default")
 PEERS = ("SciPy Radau", "SciPy BDF", "SciPy DOP853", "CVODE BDF-5")
@@ -40,7 +41,8 @@ class Found(NamedTuple):
     outcome : "done"; "refused" at the start; "stopped" by a SimulationError; "failed", a peer; "cut off", too slow; "-", not
         installed.
     t : time reached. dt : step, NaN if the method chooses. error : largest, relative to the largest value of each of x, y, theta
-    (or as the case defines it), NaN if unknown. energy : largest relative error over the frames, of peers at the end.
+    (or as the case defines it), NaN if unknown. energy : largest relative error over the frames, of peers at the end; with
+    loads that of the balance energy - work + dissipated, relative to the largest of the three.
     residual : of rolling, length per time. says : its error or warnings. note : other measurements of the case.
     off : largest error of positions and angles at the end, relative to the largest of each in the motion, as tolerances are (at the
         end for peers); NaN without a reference.
@@ -189,7 +191,8 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
 
 
 def _done(run: Solution, says: str, seconds: float) -> Found:
-    drift = float(np.abs(run.energy / run.energy[0] - 1).max())
+    kept, size = run.energy - run.work + run.dissipated, max(np.abs(part).max() for part in (run.energy, run.work, run.dissipated))
+    drift = float(np.abs(kept - kept[0]).max() / (abs(run.energy[0]) if run.balance is None else size))
     slip = float(run.rolling_residual.max()) if run.rolling_residual is not None else np.nan
     stats = run.stats
     return Found("done", run.t[-1], stats["dt"], np.nan, drift, slip, stats["unconverged"], stats["steps"], seconds, says)

@@ -72,7 +72,7 @@ class March:
         self.chunk = CHUNK // self.system.n or 1
         if self.system.load is not None:
             self.chunk = min(self.chunk, TABLED)
-        self.bound = problem.blown_up
+        self.bound = min(problem.blown_up, sys.float_info.max)  # an infinite energy exceeds it
         if problem.ill_posed:
             warn(problem.ill_posed)
         if integrator.stability_limit == np.inf and not integrator.adaptive:

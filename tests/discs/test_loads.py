@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compare import lump
+from continuum import untwisting_rod
 from discs import Chain, Midpoint, Problem, SimulationError, State, simulate
 from discs.integrators import METHODS, Work
-from discs.loads import Damping, Linear, Load, total
+from discs.loads import Damping, Linear, Load, Slope, total
 from discs.mechanics.lagrange import frames as coordinates
 from discs.mechanics.lagrange import lagrange_dalembert
 from tests.conftest import Model, models, uneven
@@ -204,6 +206,14 @@ def test_a_load_without_a_compiled_form_runs_on_the_plain_engine():
     assert abs(run.omega - calm.omega).max() > 1e-3
     both = replace(problem, loads=(Wind((3, 5)), Linear(np.full((3, 5), 0.05))))
     assert simulate(both, "rk4", 0.001, 2, progress=False).stats["engine"] == "plain"
+
+
+@pytest.mark.slow
+def test_without_a_bound_infinite_energy_stops_a_run():
+    """Steps that do not converge, on a steep slope: the kinetic energy overflows."""
+    problem = lump(replace(untwisting_rod(), loads=(Slope(60.0, -20.0),)), 33)
+    with pytest.raises(SimulationError, match="the run blew up, values are not finite"):
+        simulate(problem, "gauss4", 0.045, progress=False)
 
 
 @pytest.mark.parametrize(
