@@ -26,18 +26,18 @@ from continuum.bounds import FIELDS, missed, over
 from continuum.density import Density
 from continuum.functions import unresolved
 from continuum.galerkin import SpectralRod
+from continuum.hints import bent_hint, corner_hint, point_hint, points_inside, rough_hint
 from continuum.initial import resolve
 from continuum.pieces import POINTS
 from continuum.rod import Scene
 from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
 from discs import SimulationError, Solution
 from discs.arrays import Float
-from discs.loads.binding import given
 from discs.running.stats import Stats
 from discs.skew import Phase
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
-MORE = (505, 707, 1001)  # these are slow, and taken only if the errors fall fast enough
+SLOW, MORE = 259, (505, 707, 1001)  # from here on motions are slow, and taken only if the errors fall fast enough
 NODES = 1025  # nodes of a solution, enough for splines and their derivatives; more if the initial fields are narrow
 MOST_NODES = 8192
 LOOSEST = 2e-4  # largest tolerance of a step
@@ -45,7 +45,6 @@ FAR = 100.0  # times the tolerance: for larger errors shorter steps are not trie
 LEAST, MOST = 1 / 3, 0.8  # limits of p, the error of a finer motion over that of the coarser one
 RATE = 0.5  # least p of omega
 SAME = 0.05  # relative: the end of a motion is real if two motions agree on its time to this
-BENT = 1e-3  # curvature times the length: above it a line counts as bent at a free end
 
 
 class Plan(NamedTuple):
@@ -106,7 +105,7 @@ class Runner:
     """
 
     def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool = True) -> None:
-        self._scene, self._times, self._compiled, self.stages = scene, times, compiled, stages
+        self._scene, self.times, self._compiled, self.stages = scene, times, compiled, stages
         initial, length = resolve(scene), scene.rod.length
         narrowest = min((width for _, width in initial.features), default=length)
         nodes = NODES - 1
@@ -121,7 +120,7 @@ class Runner:
         steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._compiled)
         at, initial = rod.reader(self.s), self._scene.fields(self.s)
         begun = at(rod.start)
-        states = list(steps.at(self._times))
+        states = list(steps.at(self.times))
         every = Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
         fields = at(every)
         if steps.lengths:
@@ -133,7 +132,7 @@ class Runner:
         balance = reaction = None
         if rod.loads:  # what signals change of the energy is work, too
             balance = np.concatenate(steps.balance)
-            balance[:, 0] += rod.loads.driven(self._times, every.hi + every.lo) - rod.loads.driven(np.zeros(1), rod.start.hi[None])
+            balance[:, 0] += rod.loads.driven(self.times, every.hi + every.lo) - rod.loads.driven(np.zeros(1), rod.start.hi[None])
             reaction = np.concatenate(steps.reaction) if rod.loads.held.size else None
         return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance, reaction)
 
@@ -141,44 +140,6 @@ class Runner:
 def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
     """The largest difference in each field."""
     return {name: float(np.abs(a[name] - b[name]).max()) for name in FIELDS}
-
-
-def bent_hint(scene: Scene) -> str:
-    """A hint for scenes that start bent at a free end, which violates the end condition x'y'' = y'x''; empty for others."""
-    curved = any(given(getattr(load, "curvature", 0.0)) for load in scene.loads)  # the end may have a curvature then
-    if scene.closed or curved or not scene.rod.bending_stiffness or not scene.rod.radius:
-        return ""
-    length = scene.rod.length
-    d = 1e-4 * length
-    curvature = 0.0
-    for places in (d * np.arange(4.0), length - d * np.arange(4.0)):
-        fields = scene.fields(places)
-        r = fields["x"] + 1j * fields["y"]
-        slope, bend = (-3 * r[0] + 4 * r[1] - r[2]) / (2 * d), (2 * r[0] - 5 * r[1] + 4 * r[2] - r[3]) / d**2  # to d^2
-        curvature = max(curvature, float(abs((slope.conjugate() * bend).imag)) / max(float(abs(slope)) ** 2, 1e-300))
-    if curvature * length < BENT:
-        return ""
-    return "; the line starts bent at a free end, which may be why: the end has no curvature and sends out ever shorter waves"
-
-
-def point_hint(scene: Scene) -> str:
-    """A hint for scenes with a load at a point inside the rod; empty for others."""
-    points = [at for load in scene.loads if isinstance(at := getattr(load, "at", None), int | float)]
-    inside = [at for at in points if scene.closed or 0 < at < scene.rod.length]
-    if not inside:
-        return ""
-    return f"; the load at the point s = {inside[0]:g} makes a corner there, which functions resolve slowly: spread it over a width"
-
-
-def corner_hint(scene: Scene) -> str:
-    """A hint for scenes whose rod may have a corner in its parameters; empty for others."""
-    kinks = resolve(scene).kinks if scene.rod.varying else ()
-    if not kinks:
-        return ""
-    return (
-        f"; the scene, its rod included, has a corner at s = {kinks[0]:.6g}, which functions resolve slowly: round it, or take "
-        "method='richardson'"
-    )
 
 
 class Search:
@@ -203,6 +164,9 @@ class Search:
         self.estimate = dict.fromkeys(FIELDS, np.inf)
         self._change = np.inf  # of the last two motions, over its bound
         self._ratio = np.inf  # of the last two changes
+        self._pointed = bool(points_inside(scene))
+        self._narrow = narrow
+        self._pair: tuple[Motion, Motion] | None = None
 
     def result(self) -> Motion:
         """A motion within the bounds."""
@@ -216,8 +180,7 @@ class Search:
             finest = finer(finest, stages)
         last, failure = None, None
         for n, fewer in zip(sizes, (sizes[0], *sizes), strict=False):
-            # changes fall ever faster once a motion is resolved: at most as if by the square of the last ratio
-            if n in MORE and self._change * min(self._ratio, 1.0) ** (2 * len(sizes[sizes.index(n) :])) > 1:
+            if self._hopeless(n, last, len(sizes[sizes.index(n) :])):
                 break
             try:
                 found = self._run(n, tolerance)
@@ -244,6 +207,26 @@ class Search:
             raise failure
         raise ValueError(missed(self.estimate, self._bound, f"on {last.n if last else SIZES[-1]} functions"))
 
+    def _hopeless(self, n: int, last: Motion | None, left: int) -> bool:
+        """Whether n functions, and `left` sizes from there on, will not do.
+
+        Changes fall ever faster once a motion is resolved: at most as if by the square of the last ratio. With loads at points they
+        fall like 1/n (`hints.point_hint`).
+        """
+        if self._pointed and last is not None and np.isfinite(self._ratio):
+            at_most = over(self.estimate, self._bound) * last.n / SIZES[-1]
+            return n > SIZES[-1] or at_most > 3  # as estimates are up to that much too large
+        return (n >= MORE[0] or (n >= SLOW and not self._narrow)) and self._change * min(self._ratio, 1.0) ** (2 * left) > 1
+
+    def rough(self) -> str:
+        """A hint from the last two motions, see `hints.rough_hint`."""
+        if self._pair is None:
+            return ""
+        coarse, fine = self._pair
+        off = [np.abs(coarse.fields[name] - fine.fields[name]).max(axis=1) / limit for name, limit in self._bound.items()]
+        slopes = np.concatenate([fine.rod.slopes(z) for z in fine.states])
+        return rough_hint(slopes, self.runner.times, np.max(off, axis=0) <= 1)
+
     def _run(self, n: int, tolerance: float) -> Motion:
         self._bar.set_postfix(functions=n, refresh=False)
         self._bar.update()
@@ -251,7 +234,7 @@ class Search:
 
     def _reached(self, coarse: Motion, fine: Motion) -> bool:
         """Whether the coarser motion is within the bounds."""
-        change = distances(coarse.fields, fine.fields)
+        change, self._pair = distances(coarse.fields, fine.fields), (coarse, fine)
         before, self._change = self._change, over(change, self._bound)
         self._ratio = self._change / before
         ratio = float(np.clip(self._ratio, LEAST, MOST)) if np.isfinite(before) else self._plan.unknown
@@ -278,7 +261,8 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progr
         except TooFast as error:
             raise SimulationError(error.message + bent_hint(scene), error.step, error.time, error.disc) from None
         except ValueError as error:
-            raise ValueError(f"{error}{bent_hint(scene)}{point_hint(scene)}{corner_hint(scene)}") from None
+            hints = bent_hint(scene) + point_hint(scene) + corner_hint(scene)
+            raise ValueError(f"{error}{hints or search.rough()}") from None
     rounded = {"x": scene.rod.length, "y": scene.rod.length}
     estimate = {name: error + sweeps(found.tolerance) * rounded.get(name, 1.0) for name, error in search.estimate.items()}
     stats: Stats = {

@@ -290,12 +290,6 @@ def test_the_paper_s_scheme_takes_loads_with_a_potential():
         solve(replace(untwisting_rod(), loads=(Torque(1.0),)), method="leapfrog", progress=False)
 
 
-def test_a_point_load_inside_the_rod_says_why_it_is_slow(monkeypatch):
-    monkeypatch.setattr("continuum.spectral.SIZES", (15, 19))
-    with pytest.raises(ValueError, match=r"not reached.*the load at the point s = 1.3 makes a corner there"):
-        solve(straight(1.0, Torque(1.0, SMOOTH, at=1.3)), 1e-6, progress=False)
-
-
 def test_a_ring_with_a_torque_stays_round(rolling):
     """A uniform torque and resistance on a ring: the work is that of the torque, and no wave grows."""
     scene = replace(breathing_ring(rolling, duration=0.3, radius=0.7), loads=(Torque(0.5), Damping(rolling=0.2)))

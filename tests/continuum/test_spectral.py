@@ -10,8 +10,8 @@ from continuum import Rod, Scene, breathing_ring, collocation, exact, rolling_ro
 from continuum.density import Density
 from continuum.functions import polynomials, waves
 from continuum.galerkin import SpectralRod
+from continuum.hints import bent_hint
 from continuum.scenes import PAPER
-from continuum.spectral import bent_hint
 from discs import Gauss6, SimulationError
 from discs.integrators.base import Work
 
