@@ -21,7 +21,7 @@ test: .venv/dev
 	$(MAKE) --no-print-directory --jobs 4 lint types kernels field
 	$(BIN)/pytest -m "not long"
 
-# before a release: all lessons too, and every peer on every chain
+# before a release: all lessons and the site too, and every peer on every chain
 long: .venv/dev kernels field
 	$(BIN)/pytest
 

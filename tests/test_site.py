@@ -26,6 +26,7 @@ def site(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_nothing_is_fetched_from_other_servers(site):
     pages = list(site.rglob("*.html"))
     assert pages
@@ -34,6 +35,7 @@ def test_nothing_is_fetched_from_other_servers(site):
             assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", tag) or "canonical" in tag, f"{page.name}: {tag}"
 
 
+@pytest.mark.long
 def test_reference_has_everything_that_is_exported(site):
     for package in ("discs", "continuum", "compare"):
         index = (site / "reference" / f"{package}.html").read_text(encoding="utf-8")
@@ -46,6 +48,7 @@ def test_reference_has_everything_that_is_exported(site):
             assert f'id="{anchor}"' in (site / "reference" / page).read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_reference_tells_parameters_shapes_and_errors(site):
     page = (site / "reference" / "discs.simulation.html").read_text(encoding="utf-8")
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", page))
@@ -56,6 +59,7 @@ def test_reference_tells_parameters_shapes_and_errors(site):
     assert "(F, N), contact points, length." in re.sub(r"<[^>]+>", "", page)
 
 
+@pytest.mark.long
 def test_lessons_are_pages_with_formulas_and_notebooks_to_take_away(site):
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         page = (site / "lessons" / f"{path.stem}.html").read_text(encoding="utf-8")

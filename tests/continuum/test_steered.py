@@ -183,7 +183,7 @@ def test_true_curvature_converges_at_order_two_with_either_end(parameters):
     scene = untwisting_rod("unit", curvature="true", **parameters)
     field = solve(scene, 1e-4, frames=2, progress=False)
     for ends in ("springs", "consistent"):
-        study = convergence(scene, (33, 65, 129), ends, field=field, progress=False)
+        study = convergence(scene, (17, 33, 65), ends, field=field, progress=False)
         assert (study.order[-1] > 1.5).all(), study.table()
         assert study.error[-1].max() < 5e-3
     np.testing.assert_allclose(field.energy, field.energy[0], rtol=1e-9)
