@@ -34,7 +34,7 @@ def free_rod(
 
     Parameters
     ----------
-    rod : the rod, with linear curvature, which is the true one while |r'| = 1. The radius has no effect, as nothing rolls.
+    rod : the rod, uniform, with linear curvature, which is the true one while |r'| = 1. The radius has no effect, as nothing rolls.
     r0, v0 : positions and velocities of the centre line, with |r0'| = 1 and r0' . v0' = 0: functions of s (m,) that return (2, m),
         evaluated between the nodes too, or values at the nodes, (2, n). A frame of an earlier run, (x, y) and (x_rate, y_rate),
         continues that run.

@@ -1,4 +1,4 @@
-"""Named scenes. Parameters of the rod that are not given have the paper's values."""
+"""Named scenes. Parameters of the rod are numbers or functions of s; those that are not given have the paper's values."""
 
 from functools import partial
 from typing import Any, TypedDict, Unpack

@@ -56,6 +56,9 @@ def solve(
     "leapfrog": the paper's explicit scheme on n points with step dt, by default as in the paper (32, k^2/8): plain springs, end
     discs of full weight, no error estimate.
 
+    Parameters of the rod that are functions of s are taken by every method, if they are continuous ("spectral": and if K does not
+    fall below 1e-4 of its largest value).
+
     Loads of a scene with slaved headings: "spectral" takes those of `continuum.load_terms` (see `continuum.weak`), "richardson" all
     that discs take, "leapfrog" those with a potential. Steps do not jump over signals (`continuum.timing`).
 
