@@ -216,7 +216,7 @@ class Search:
         if self._pointed and last is not None and np.isfinite(self._ratio):
             at_most = over(self.estimate, self._bound) * last.n / SIZES[-1]
             return n > SIZES[-1] or at_most > 3  # as estimates are up to that much too large
-        return (n >= MORE[0] or (n >= SLOW and not self._narrow)) and self._change * min(self._ratio, 1.0) ** (2 * left) > 1
+        return (n in MORE or (n >= SLOW and not self._narrow)) and self._change * min(self._ratio, 1.0) ** (2 * left) > 1
 
     def rough(self) -> str:
         """A hint from the last two motions, see `hints.rough_hint`."""
