@@ -15,10 +15,11 @@ from compare.results import Study, format_table
 from compare.study import convergence
 from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
 from discs.arrays import Float
-from discs.loads import Damping, Rest, Slope, Torque, signals
+from discs.loads import Damping, Motor, OnRod, Rest, Slope, Torque, signals
 
 SIZES = (129, 257, 513, 1025)
 DURATION = 3.0
+LEAST = 3e-7  # tolerance where the field is solved by differences
 START = signals.smooth(0.0, 2.0)  # a load that starts at once violates the conditions at free ends at t = 0: no clean order
 
 
@@ -32,7 +33,28 @@ def _round(s: Float) -> Float:
     return 0.3 * np.cos(0.5 * np.pi * s)
 
 
-LOADS = {
+def _inside(s: Float) -> Float:
+    """A curvature along the rod, zero at its ends."""
+    return 0.6 * np.sin(0.25 * np.pi * s) ** 4
+
+
+def _wave(s: Float) -> Float:
+    """A curvature with one wave along the rod, or around a ring."""
+    return 0.5 * np.cos(0.5 * np.pi * s)
+
+
+def _fitting(s: Float, fields: int = 4) -> tuple[Float, ...]:
+    """The straight rod, theta' ~ sin^5(pi s/4), so that it fits free and held ends; and zeros up to `fields`."""
+    c = np.cos(0.25 * np.pi * s)
+    return s, 0 * s, -1.5 * (c - 2 * c**3 / 3 + c**5 / 5), *(0 * s for _ in range(fields - 3))
+
+
+def _speed(t: float) -> float:
+    """The rate of a motor."""
+    return 0.5 * float(signals.smooth(0.0, 1.5)(t))
+
+
+LOADS: dict[str, tuple[OnRod, ...]] = {
     "none": (),
     "rolling resistance": (Damping(rolling=0.3),),
     "viscous torsion": (Damping(torsion=0.2),),
@@ -40,11 +62,22 @@ LOADS = {
     "torque in the middle": (Torque(_middle, START),),
     "driven end": (Torque(0.3, START, at=0.0),),
     "rest twist": (Rest(twist=0.2, signal=START),),
+    "rest curvature": (Rest(curvature=_inside, signal=START),),
+    "bending viscosity": (Damping(bending=0.2),),
 }
-ON_A_RING = {
+AT_AN_END: dict[str, tuple[OnRod, ...]] = {"held end": (Motor(0.0, at=0.0),), "motor at the end": (Motor(_speed, at=0.0),)}
+OWN_HEADINGS: dict[str, tuple[OnRod, ...]] = {
+    "own, rest curvature": (Rest(curvature=_inside),),
+    "own, actuated": (Rest(curvature=_wave, signal=signals.smooth(0.0, 1.2)),),
+    "own, viscosity": (Damping(bending=0.2),),
+}
+ON_A_RING: dict[str, tuple[OnRod, ...]] = {
     "ring, resistance": (Damping(rolling=0.3, torsion=0.2),),
     "ring, torque": (Torque(_round, START),),
+    "ring, actuated": (Rest(curvature=_wave, signal=signals.smooth(0.0, 0.8)),),
+    "ring, bending viscosity": (Damping(bending=0.2), Torque(_round, START)),
 }
+CURVED_ENDS = "curved to the ends, t = 1.5"  # first order in the end: see `discs.loads.bends`
 
 
 def wavy(s: Float, mean: float, depth: float, q: float, phase: float = 0.0) -> Float:
@@ -68,6 +101,14 @@ def scenes() -> dict[str, Scene]:
     rod, ring = untwisting_rod(duration=DURATION), breathing_ring(duration=1.0, omega=0.2)
     on_rod = {name: replace(rod, loads=loads) for name, loads in LOADS.items()}
     on_ring = {name: replace(ring, loads=loads) for name, loads in ON_A_RING.items()}
+    bent = Rest(curvature=0.3, signal=signals.smooth(0.0, 1.2))
+    on_rod[CURVED_ENDS] = replace(rod, loads=(bent,), duration=1.5)
+    fitting = replace(rod, initial=_fitting, duration=2.0)
+    on_rod |= {name: replace(fitting, loads=loads) for name, loads in AT_AN_END.items()}
+    beam = steered_rod(duration=1.5)
+    own = {name: replace(beam, loads=loads) for name, loads in OWN_HEADINGS.items()}
+    fitting = replace(beam, initial=partial(_fitting, fields=6), duration=2.0)
+    own |= {f"own, {name}": replace(fitting, loads=loads) for name, loads in AT_AN_END.items()}
     half, whole = np.pi / rod.rod.length, 2 * np.pi / rod.rod.length
     beams: dict[str, Any] = {
         "stretch_stiffness": partial(wavy, mean=10.0, depth=0.4, q=half),
@@ -80,12 +121,13 @@ def scenes() -> dict[str, Scene]:
         "varying ring": breathing_ring(duration=0.5, omega=0.2, **varying(whole)),
         "varying, own headings": steered_rod(duration=1.5, **varying(half), **beams),
     }
-    return on_rod | on_ring | uneven
+    return on_rod | on_ring | own | uneven
 
 
 def study(scene: Scene, n: tuple[int, ...], tol: float) -> list[Study]:
     """Discs against the field of a scene, with each kind of ends."""
-    field = solve(scene, tol, frames=1, progress=False)
+    viscous = any(isinstance(load, Damping) and load.bending for load in scene.loads) and not scene.steered
+    field = solve(scene, max(tol, LEAST) if viscous else tol, "richardson" if viscous else None, frames=1, progress=False)
     if scene.steered:
         return [replace(convergence(scene, n, "springs", field, progress=False), ends="own")]
     ends = ("ring",) if scene.closed else ("springs", "consistent")

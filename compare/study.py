@@ -7,11 +7,10 @@ from tqdm import tqdm
 from compare.lump import lump
 from compare.results import Study, compared
 from continuum import Scene, solve
+from continuum.mesh import stepper
 from continuum.solver import spline
-from discs import Integrator, Midpoint, Problem, Solution, Suzuki4, checks, simulate
+from discs import Integrator, Problem, Solution, checks, simulate
 from discs.arrays import Float, Int
-
-TIGHT = Suzuki4(Midpoint(tolerance=1e-10))
 
 
 def convergence(
@@ -20,7 +19,7 @@ def convergence(
     ends: str = "springs",
     field: Solution | None = None,
     dt: float | None = None,
-    method: str | Integrator = TIGHT,
+    method: str | Integrator | None = None,
     tol: float = 1e-5,
     progress: bool = True,
 ) -> Study:
@@ -32,7 +31,7 @@ def convergence(
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame must be at the end of the scene.
     dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
-    method : integrator of the chains.
+    method : integrator of the chains; None for `continuum.mesh.stepper`.
     """
     sizes, problems = checked_sizes(scene, n, ends)
     if field is None:
@@ -47,7 +46,9 @@ def convergence(
     error = np.empty((len(problems), len(fields)))
     bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
-        run = simulate(problem, method, h, frames=1, progress=progress and i == 0)  # the first may report that kernels are compiled
+        run = simulate(
+            problem, stepper(scene, 1e-10) if method is None else method, h, frames=1, progress=progress and i == 0
+        )  # the first may report that kernels are compiled
         for j, name in enumerate(fields):
             error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
     floor = max(field.error_estimate[name] for name in fields)

@@ -5,7 +5,7 @@ import pytest
 
 from compare import lump
 from compare.__main__ import main
-from compare.load_limits import LOADS, ON_A_RING, scenes, study
+from compare.load_limits import AT_AN_END, LOADS, ON_A_RING, OWN_HEADINGS, scenes, study
 from continuum import Rod, Scene, solve
 from continuum.scenes import PAPER
 from discs import simulate
@@ -16,13 +16,18 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("name", scenes())
 def test_loaded_discs_tend_to_the_loaded_field(name):
-    """Rings and own headings at order 2; consistent ends at 1.8 to 2.3 here, and at 1.97 to 2.1 from 513 to 1025 discs."""
+    """Rings and own headings at order 2; consistent ends at 1.8 to 2.3 here, and at 1.97 to 2.1 from 513 to 1025 discs.
+
+    A held end, where the line starts straight: the part of first order of plain springs is small here.
+    """
     scene = scenes()[name]
     for found in study(scene, (65, 129, 257), 1e-6):
         worst = found.error.max(axis=1)
         order = np.log(worst[1] / worst[2]) / np.log(found.k[1] / found.k[2])
         exact = 1.95, 2.05
-        least, most = {"ring": exact, "own": exact, "consistent": (1.75, 2.3), "springs": (0.7, 1.05)}[found.ends]
+        least, most = {"ring": exact, "own": exact, "consistent": (1.75, 2.3), "springs": (0.7, 1.05 + (name == "held end"))}[
+            found.ends
+        ]
         assert least < order < most, (found.ends, found.error, order)
 
 
@@ -31,7 +36,7 @@ def test_command_line(tmp_path, capsys):
     assert {path.name for path in tmp_path.iterdir()} == {"loads.csv", "loads.png"}
     told = capsys.readouterr().out
     assert "driven end" in told
-    free, others = len(LOADS) + 2, len(ON_A_RING) + 2
+    free, others = len(LOADS) + len(AT_AN_END) + 3, len(ON_A_RING) + len(OWN_HEADINGS) + len(AT_AN_END) + 2
     assert len((tmp_path / "loads.csv").read_text().splitlines()) == 1 + 2 * (2 * free + others)
 
 
