@@ -19,7 +19,6 @@ from discs.loads import Damping, Motor, OnRod, Rest, Slope, Torque, signals
 
 SIZES = (129, 257, 513, 1025)
 DURATION = 3.0
-LEAST = 3e-7  # tolerance where the field is solved by differences
 START = signals.smooth(0.0, 2.0)  # a load that starts at once violates the conditions at free ends at t = 0: no clean order
 
 
@@ -126,8 +125,7 @@ def scenes() -> dict[str, Scene]:
 
 def study(scene: Scene, n: tuple[int, ...], tol: float) -> list[Study]:
     """Discs against the field of a scene, with each kind of ends."""
-    viscous = any(isinstance(load, Damping) and load.bending for load in scene.loads) and not scene.steered
-    field = solve(scene, max(tol, LEAST) if viscous else tol, "richardson" if viscous else None, frames=1, progress=False)
+    field = solve(scene, tol, frames=1, progress=False)
     if scene.steered:
         return [replace(convergence(scene, n, "springs", field, progress=False), ends="own")]
     ends = ("ring",) if scene.closed else ("springs", "consistent")

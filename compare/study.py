@@ -7,9 +7,9 @@ from tqdm import tqdm
 from compare.lump import lump
 from compare.results import Study, compared
 from continuum import Scene, solve
-from continuum.mesh import stepper
+from continuum.mesh import viscous
 from continuum.solver import spline
-from discs import Integrator, Problem, Solution, checks, simulate
+from discs import Gauss6, Integrator, Midpoint, Problem, Solution, Suzuki4, checks, simulate
 from discs.arrays import Float, Int
 
 
@@ -31,7 +31,7 @@ def convergence(
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame must be at the end of the scene.
     dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
-    method : integrator of the chains; None for `continuum.mesh.stepper`.
+    method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscous bending.
     """
     sizes, problems = checked_sizes(scene, n, ends)
     if field is None:
@@ -41,14 +41,14 @@ def convergence(
             f"field must be solve(scene, tol) of this scene up to t = {scene.duration:g}, with an error estimate; got {field!r}"
         )
     h = scene.duration / max(300, 8 * field.stats.get("steps", 0)) if dt is None else checks.number("dt", dt, positive=True)
+    if method is None:
+        method = Gauss6(tolerance=1e-10) if viscous(scene) else Suzuki4(Midpoint(tolerance=1e-10))
     fields = compared(scene)
     limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in fields}
     error = np.empty((len(problems), len(fields)))
     bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
-        run = simulate(
-            problem, stepper(scene, 1e-10) if method is None else method, h, frames=1, progress=progress and i == 0
-        )  # the first may report that kernels are compiled
+        run = simulate(problem, method, h, frames=1, progress=progress and i == 0)  # the first may report that kernels are compiled
         for j, name in enumerate(fields):
             error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
     floor = max(field.error_estimate[name] for name in fields)

@@ -270,7 +270,7 @@ class SpectralRod(SkewGradient):
             out += self.loads.gradient(secant)
         return out
 
-    def modes(self, c: Basis, t: float = 0.0) -> Modes | Pencil:
+    def modes(self, c: Basis, t: float = 0.0, q: Any = None) -> Modes | Pencil:
         """The eigenvectors of C^T (grad^2 V) C at the time t; with them (I + g C^T (grad^2 V) C)^-1 takes two matrix products.
 
         Damping has other eigenvectors: a `Pencil` then has both matrices.
@@ -284,10 +284,10 @@ class SpectralRod(SkewGradient):
         if self.loads:
             bent += self.loads.stiffened(xy, t)
         stiffness = c.t[:, None] * (bent + self.torsion) * c.t
-        if self.loads and (damping := self.loads.matrix).size:
-            return Pencil(stiffness, c.t[:, None] * damping * c.t)
+        if self.loads and self.loads.damps:
+            return Pencil(stiffness, c.t[:, None] * self.loads.damped(xy, q) * c.t)
         values, vectors = np.linalg.eigh(stiffness)
         return Modes(values, np.ascontiguousarray(vectors), np.ascontiguousarray(vectors.T))
 
     def solve(self, secant: Float, c: Basis, g: complex, rhs: Float, d: complex = 0.0, t: float = 0.0, q: Any = None) -> Float:
-        return self.modes(c, t).solve(d, g, rhs)
+        return self.modes(c, t, q).solve(d, g, rhs)

@@ -9,7 +9,7 @@ from continuum.initial import resolve
 from continuum.parameters import sample
 from continuum.pieces import POINTS
 from continuum.rod import PARAMETERS, Scene, SteeredRod
-from discs import Chain, Gauss6, Integrator, Midpoint, Problem, State, SteeredChain, Suzuki4, checks
+from discs import Chain, Problem, State, SteeredChain, checks
 from discs.arrays import Float
 from discs.chains import stencils
 from discs.files.schema import ROD
@@ -19,17 +19,9 @@ from discs.loads.binding import given
 UNSEEN = 1 / 4  # of an energy: discs that miss more than this do not resolve the initial fields
 
 
-def stepper(scene: Scene, tolerance: float) -> Integrator:
-    """A method for the nodes of a scene, whose sweeps have a tolerance: Suzuki's composition of midpoint steps.
-
-    Compositions have steps back in time, in which viscosity, stiff on a fine mesh, amplifies. So with viscosity of bending it is a
-    Gauss method. Where headings follow the line, this viscosity depends on their shape, and it is the midpoint rule, whose sweeps
-    converge.
-    """
-    middle = Midpoint(tolerance=tolerance)
-    if not any(given(load.bending) for load in scene.loads if isinstance(load, Damping)):
-        return Suzuki4(middle)
-    return Gauss6(tolerance=tolerance) if scene.steered else middle
+def viscous(scene: Scene) -> bool:
+    """Whether bending is viscous, stiff on a fine mesh: compositions have steps back in time, in which it amplifies."""
+    return any(given(load.bending) for load in scene.loads if isinstance(load, Damping))
 
 
 def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:

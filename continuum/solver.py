@@ -11,12 +11,12 @@ from tqdm import tqdm
 
 from continuum.bounds import FIELDS, bounds, missed, over
 from continuum.initial import resolve
-from continuum.mesh import semidiscretise, stepper, unseen
+from continuum.mesh import semidiscretise, unseen, viscous
 from continuum.refinement import solve_elements
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
 from continuum.timing import Timing
-from discs import Problem, Solution, checks, simulate, suggest_dt
+from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.arrays import Float, Spline
 from discs.running.frames import frame_times
 from discs.warn import warn
@@ -48,9 +48,9 @@ def solve(
     d = |T_{k/2} - T_k| fall by a factor rho from mesh to mesh, it is d rho/(1 - rho). rho is measured, and limited to 1/4 ... 9/10.
     The rod's ends are not smooth (the curvature has a growing thin layer there), so the error of T falls like k^2 rather than k^4
     (docs/accuracy.md). If the initial fields have corners it falls more slowly, and rho is at least 1/2. The coarsest mesh resolves
-    the initial fields (`continuum.mesh.unseen`). The step of `continuum.mesh.stepper` is halved on the coarsest mesh
-    until its effect is below a quarter of the tolerance. The effect is measured again on the finest mesh but one, and is part of
-    the estimate.
+    the initial fields (`continuum.mesh.unseen`). The step of "suzuki4" ("midpoint" with viscous bending) is halved on the coarsest
+    mesh until its effect is below a quarter of the tolerance. The effect is measured again on the finest mesh but one, and is part
+    of the estimate.
 
     "elements": spectral elements for a `SteeredRod`, refined to the tolerance; see `continuum.elements`.
 
@@ -119,7 +119,8 @@ def solve(
 def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progress: bool) -> Solution:
     tol = min(bound.values())
     # the tolerance of sweeps is far below tol, as their errors add up over the steps
-    method = stepper(scene, min(1e-10, 1e-5 * tol))
+    middle = Midpoint(tolerance=min(1e-10, 1e-5 * tol))
+    method = middle if viscous(scene) else Suzuki4(middle)
 
     def mesh(n: int) -> Problem:
         return semidiscretise(scene, n - 1 if scene.closed else n, "consistent")

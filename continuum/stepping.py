@@ -137,8 +137,8 @@ class Steps:
         while True:
             if fresh:
                 c = self.rod.basis(z.hi + z.lo)
-                middle = self.rod.basis(z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi))
-                self._modes = self.rod.modes(middle, t + 0.5 * h)
+                middle = z.hi + z.lo + 0.5 * h * self.rod.forward(c, z.pi)
+                self._modes = self.rod.modes(self.rod.basis(middle), t + 0.5 * h, middle)
             after, v, p, taken = self._sweep(t, z, h)
             if fresh:
                 self._usual, self._excess = taken, 0

@@ -6,7 +6,7 @@ Admissible variations are (e psi, psi). Loads add their virtual work to d'Alembe
     slope             rho g . e psi                spring            -kappa (r - r_a) . e psi
     rolling damping   -c omega psi                 torsional viscosity   -eta omega' psi'
     rest twist tau_0  beta tau_0 psi'              from beta (theta' - tau_0)^2/2
-    rest curvature: see `continuum.curved`
+    rest curvature, viscosity of bending: see `continuum.curved`, `continuum.viscous`
 
 As for the elastic forces, e psi is replaced by P(e psi), which the functions can form. Then the virtual work is f . C delta for
 forces f on the coordinates: with the functions phi_k of the line and psi_k of theta
@@ -45,12 +45,13 @@ from continuum.curved import Curved, forces, product
 from continuum.functions import Functions
 from continuum.initial import Resolved
 from continuum.kernels.spectral_load import NONE, Load
-from continuum.load_places import cut_patterns, point_loads
+from continuum.load_places import cut_patterns, point_loads, read
 from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken
 from continuum.motors import Motors
 from continuum.timing import Timing
+from continuum.viscous import Viscous
 from discs.arrays import Float, Int
-from discs.loads import signals
+from discs.loads import Damping, signals
 from discs.loads.motor import HELD
 from discs.loads.signals import Signal
 
@@ -61,7 +62,7 @@ class Weak(NamedTuple):
     constant : (3, n), forces with a potential. damping : (n, n), D on omega. stiffness : (n, n), of the springs on x and on y.
         Both are (0, 0) if there are none.
     drives : (L, 3, n). signals, names : of the drives. closing (L,), squares (L, L + 1) : energies of rest twists, see `driven`.
-    curved : rest curvature; None for none.
+    curved, viscous : rest curvature, and viscosity of bending; None for none.
     energy : the energy of the loads with a potential, for the initial fields.
     timing : the pieces of the signals.
     motors : the motors. held : (motors,), their nodes.
@@ -76,6 +77,7 @@ class Weak(NamedTuple):
     closing: Float
     squares: Float
     curved: Curved | None
+    viscous: Viscous | None
     energy: float
     timing: Timing
     motors: Motors
@@ -97,7 +99,11 @@ class Weak(NamedTuple):
         motors = np.zeros((self.held.size, *self.constant.shape))
         motors[np.arange(self.held.size), 2, self.held] = HELD
         patterns = np.concatenate([self.constant[None], self.drives, motors])
-        return NONE._replace(patterns=patterns.reshape(len(patterns), -1), damping=self.matrix, stiffness=self.stiffness)
+        load = NONE._replace(patterns=patterns.reshape(len(patterns), -1), damping=self.matrix, stiffness=self.stiffness)
+        if self.viscous is None:
+            return load
+        turns = self.viscous.turns
+        return load._replace(viscosity=self.viscous.eta, turns=turns, back=np.ascontiguousarray(turns.T))
 
     def stages(self, t: Float) -> Load:
         """The parameters for a step with stages at the times (s,)."""
@@ -131,6 +137,16 @@ class Weak(NamedTuple):
             total = total + product(self.curved.matrices(self.values(np.array([t])))[0], xy)
         return total
 
+    @property
+    def damps(self) -> bool:
+        """Whether there are dampers or motors."""
+        return bool(self.damping.size or self.held.size or self.viscous is not None)
+
+    def damped(self, xy: Float, q: Float | None) -> Float:
+        """C^T D C less its factors t, for moves (n, 2, n) of the line by omega at the nodes, at a position (3, n)."""
+        matrix = self.matrix if self.matrix.size else np.zeros((len(xy), len(xy)))
+        return matrix if self.viscous is None or q is None else matrix + self.viscous.product(q, xy)
+
     def driven(self, t: Float, q: Float) -> Float:
         """The part of the energy that depends on time, at times (m,) and changes of the positions (m, 3, n)."""
         bent = np.zeros(t.size)
@@ -151,6 +167,8 @@ class Weak(NamedTuple):
             work = work + (self._bent(t, q) * v[:, :2]).sum(axis=(1, 2))
         omega = v[:, 2]
         lost = (omega @ self.damping * omega).sum(axis=1) if self.damping.size else np.zeros(t.size)
+        if self.viscous is not None:
+            lost = lost + self.viscous.dissipated(q, v)
         return np.stack([work, lost], axis=1)
 
     def _bent(self, t: Float, q: Float) -> Float:
@@ -169,6 +187,8 @@ class Weak(NamedTuple):
         f: Float = np.einsum("ml,lin->min", self.values(t), self.drives)
         if self.curved is not None:
             f[:, :2] += self._bent(t, q)
+        if self.viscous is not None:
+            f[:, :2] += self.viscous.force(q, v)
         if self.damping.size:
             f[:, 2] -= v[:, 2] @ self.damping
         return f
@@ -227,6 +247,7 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
         closing=np.array([drive.push[TWIST] @ twisted for drive in terms.drives]),
         squares=strains @ np.vstack([strains, terms.strain]).T,
         curved=curved,
+        viscous=_viscous(terms, functions),
         energy=terms.offset + bent + float(line_energy + 0.5 * terms.strain @ terms.strain - terms.push[TWIST] @ twisted),
         timing=timing,
         motors=Motors(terms.axles, timing, scene.duration, np.array([initial.fields(at)["omega"][0] for at in places])),
@@ -243,3 +264,12 @@ def _curved(terms: Terms, functions: Functions) -> Curved | None:
     weights = terms.w * terms.scene.rod.at(terms.s).bending_stiffness
     slope, bend, mean = functions.line(terms.s, 1), functions.line(terms.s, 2), complex(*terms.scene.shift) / terms.scene.rod.length
     return Curved.of(np.array([kappas[0], *(kappas[1 + i] for i in parts)]), parts, weights, slope, bend, mean)
+
+
+def _viscous(terms: Terms, functions: Functions) -> Viscous | None:
+    """The viscosity of bending of the loads; None for none."""
+    eta = np.zeros(functions.there.size)
+    for load in terms.scene.loads:
+        if isinstance(load, Damping):
+            eta += read("bending of Damping", load.bending, functions.there, 0.0)
+    return Viscous.of(eta, functions, complex(*terms.scene.shift) / terms.scene.rod.length) if eta.any() else None

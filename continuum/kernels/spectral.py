@@ -154,7 +154,7 @@ def _forces(rod, work, state, t, moves, c, p, g):
     s, _, n = moves.shape
     points, pull = c.finer.shape[2], g.reshape(s, n)
     loaded = rod.load.patterns.shape[0] > 0
-    push = press(rod.load, work, moves, c.omega) if loaded else moves  # before c.omega is used for theta
+    push = press(rod.load, work, moves, c, rod.shift) if loaded else moves  # before c.omega is used for theta
     for i in range(s):
         for k in range(n):
             c.xy[2 * i, k] = rod.bending[k] * (work[0, k] + moves[i, 0, k])

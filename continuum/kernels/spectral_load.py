@@ -13,7 +13,8 @@ class Load(NamedTuple):
 
     patterns : (L, 3 n), forces. signals : (s, L), their signals at the stages, set before each step; 1 for forces with a potential.
     damping : (n, n), on omega. stiffness : (n, n), of springs, on x and on y. bent : (s, n, n + 1), of rest curvature at the
-    stages, see `continuum.curved.Curved.matrices`, set before each step.
+    stages, see `continuum.curved.Curved.matrices`, set before each step. viscosity, turns, back : (F,), (n, 2 F), (2 F, n), of
+    bending, as in `continuum.viscous`.
     """
 
     patterns: Float
@@ -21,19 +22,22 @@ class Load(NamedTuple):
     damping: Float
     stiffness: Float
     bent: Complex
+    viscosity: Float
+    turns: Float
+    back: Float
 
 
 _EMPTY = np.empty((0, 0))
-NONE = Load(_EMPTY, _EMPTY, _EMPTY, _EMPTY, np.empty((0, 0, 0), complex))
+NONE = Load(_EMPTY, _EMPTY, _EMPTY, _EMPTY, np.empty((0, 0, 0), complex), np.empty(0), _EMPTY, _EMPTY)
 
 
 @part(_nrt=True)
-def press(load, work, moves, omega):
-    """Forces at the stages, (s, 3, n), after each of `moves` from the base, with the rates omega (s, n)."""
+def press(load, work, moves, c, shift):
+    """Forces at the stages, (s, 3, n), after each of `moves` from the base; c has the rates."""
     s, _, n = moves.shape
     f = np.dot(load.signals, load.patterns).reshape(s, 3, n)
     if load.damping.shape[0]:
-        lost = np.dot(omega, load.damping)
+        lost = np.dot(c.omega, load.damping)
         for i in range(s):
             for k in range(n):
                 f[i, 2, k] -= lost[i, k]
@@ -52,4 +56,28 @@ def press(load, work, moves, omega):
             for k in range(n):
                 f[i, 0, k] -= held[k].real
                 f[i, 1, k] -= held[k].imag
+    if load.viscosity.size:
+        drag(load, c, shift, f)
     return f
+
+
+@part(_nrt=True)
+def drag(load, c, shift, f):
+    """Add the force of viscosity of bending, from the line and its rates c.xy."""
+    s, _, n = f.shape
+    finer = load.viscosity.size
+    fast, pull = np.dot(c.xy, load.turns), np.empty((2 * s, 2 * finer))
+    for i in range(s):
+        for k in range(finer):
+            zx, zy = c.line[2 * i, n + k] + shift.real, c.line[2 * i + 1, n + k] + shift.imag
+            bx, by = c.line[2 * i, n + finer + k], c.line[2 * i + 1, n + finer + k]
+            rate = fast[2 * i, k] * by - fast[2 * i + 1, k] * bx
+            rate += zx * fast[2 * i + 1, finer + k] - zy * fast[2 * i, finer + k]
+            moment = load.viscosity[k] * rate
+            pull[2 * i, k], pull[2 * i + 1, k] = -moment * by, moment * bx
+            pull[2 * i, finer + k], pull[2 * i + 1, finer + k] = moment * zy, -moment * zx
+    moved = np.dot(pull, load.back)
+    for i in range(s):
+        for k in range(n):
+            f[i, 0, k] += moved[2 * i, k]
+            f[i, 1, k] += moved[2 * i + 1, k]

@@ -29,8 +29,8 @@ g = 0 for the ghost disc. As k -> 0 they leave on these discs the forces N . e (
 equilibrium, but change the curvature of the next discs by O(k), for g = 0 that of the end too: r and theta then converge at order
 1. No stencil leaves none, as the second moment, k^2 N . e/2, does not depend on g. At small kappa_0 the rest of the rod feels no
 couple if g = -72/11; otherwise g depends on the motion, measured -6.6 to -6.8 for both laws, bent rods and rods that are bent by a
-signal. With g = -20/3 the error of order 1 is a hundredth of that with g = 0; measured orders are 1.9 to 2.1 up to N = 2049. Where
-headings are taken, the slope stays that of the ghost disc.
+signal. With g = -20/3 the error of order 1 is a hundredth of that with g = 0, and seen where few others are left, see
+docs/loads.md. Where headings are taken, the slope stays that of the ghost disc.
 
 **True curvature**: kappa is the turn of the line over k, with the rate (b./b - a./a).imag/k for the links a and b before and
 after the disc, as complex numbers. Its rest value is part of the link law (`discs.chains.links.true`).

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 
 from continuum import Rod, Scene, breathing_ring, solve, untwisting_rod
@@ -21,7 +22,7 @@ EVERYTHING = (
     Torque(0.3, signals.sine(1.0, 2.0), at=0.0),
     Torque(lambda s: 0.2 * (s > 1.3), signals.pulse(0.4, 0.05)),
     Force(x=lambda s: 0.1 * s, y=0.2, signal=SMOOTH),
-    Damping(rolling=0.1, torsion=lambda s: 0.02 * (1 + s)),
+    Damping(rolling=0.1, torsion=lambda s: 0.02 * (1 + s), bending=lambda s: 0.05 * s),
     Slope(gx=0.1, gy=-0.2),
     Spring(lambda s: s, 0.1, 0.3),
     Spring(0.0, 0.0, 0.4, at=3.0),
@@ -172,6 +173,33 @@ def test_a_free_end_has_its_rest_curvature_and_a_known_stretch(rolling):
     assert np.abs(run.energy - run.energy[0]).max() < 1e-10
 
 
+@pytest.mark.parametrize("eta", [0.1, 20.0])
+def test_viscosity_damps_bending_waves_like_an_oscillator(eta):
+    """y = R theta: M theta.. = -(beta q^2 + K R^2 q^4) theta - eta R^2 q^4 theta.; strong too, at few steps."""
+    q, small = 2 * np.pi / ROD.length, 1e-5
+    run = field(straight(2.0, Damping(bending=eta), theta=lambda s: small * np.cos(q * s), closed=True), 1e-10)
+    stiff = ROD.torsion_stiffness * q**2 + ROD.bending_stiffness * ROD.radius**2 * q**4
+    low, high = np.roots([M, eta * ROD.radius**2 * q**4, stiff]).astype(complex)
+    swing = (high * np.exp(low * run.t) - low * np.exp(high * run.t)) / (high - low)
+    assert np.abs(run.theta / small - np.outer(swing.real, np.cos(q * run.s))).max() < 1e-4
+    assert run.stats["steps"] < 200
+
+
+def test_viscosity_keeps_the_curvature_and_the_slope_of_free_ends(rolling):
+    """And a ring that turns and breathes dissipates by breathing only: kappa = a^2/a_0^3, int eta kappa.^2 = l eta kappa.^2."""
+    run = field(replace(untwisting_rod(rolling, **UNEVEN, duration=1.5), loads=(Damping(bending=0.3),)), 1e-8, 3)
+    line = CubicSpline(run.s, run.x[-1] + 1j * run.y[-1])
+    z, bend = line(run.s[[0, -1]], 1), line(run.s[[0, -1]], 2)
+    assert np.abs(z) == pytest.approx(1.0, abs=1e-6)
+    assert np.abs((z.conj() * bend).imag).max() < 1e-3 * np.abs(bend).max()
+    assert run.dissipated[-1] > 1e-3 * run.energy[0]
+    ring = field(replace(breathing_ring(rolling, duration=0.4), loads=(Damping(bending=0.2),)), 1e-8, 101)
+    a = np.hypot(ring.x[:, 0], ring.y[:, 0])
+    rate = np.gradient(a**2 / a[0] ** 3, ring.t, edge_order=2)
+    lost = 2 * np.pi * a[0] * 0.2 * cumulative_simpson(rate**2, x=ring.t, initial=0)
+    assert np.abs(ring.dissipated - lost).max() < 1e-3 * lost[-1]
+
+
 def test_a_rod_on_the_arc_of_its_rest_curvature_stays_there(rolling):
     """Closed too, a ring of its own radius; both without energy."""
     a = ROD.length / (2 * np.pi)
@@ -252,7 +280,7 @@ def test_a_scene_without_loads_computes_none():
         ((Torque(1.0, about="turn"),), r"about='turn' is for rods with headings of their own"),
         ((Damping(turning=1.0),), r"turning is for rods with headings of their own"),
         ((Damping(rolling=-1.0),), r"rolling of Damping must be .*at least 0"),
-        ((Damping(bending=1.0),), r"Damping\(bending=...\): the spectral solver has no form of it"),
+        ((Damping(bending=-1.0),), r"bending of Damping must be .*at least 0"),
         ((Rest(shear=1.0),), r"shear is for rods with headings of their own"),
         ((Spring(0, 0, -1.0),), r"stiffness of Spring must be at least 0; got -"),
         ((Torque(1.0, lambda t: np.nan),), r"Torque: the signal .* finite numbers; got nan at t = "),
