@@ -167,11 +167,11 @@ def test_both_engines_agree(kind):
 @pytest.mark.slow  # kernels of chains
 @pytest.mark.parametrize("rolling", ["field", "unit"])
 def test_loads_on_a_rod_that_varies(rolling):
-    """Slope, rest twist and viscosity take rho and beta where they are: fields by two methods agree, and energy is balanced."""
+    """Slope, rest shapes and viscosity take rho, beta and K where they are: fields by two methods agree, and energy is balanced."""
     loads = (
         Slope(0.1, -0.2),
         Rest(twist=lambda s: 0.2 * s),
-        Rest(twist=0.3, signal=signals.smooth(0.0, 1.0)),
+        Rest(twist=0.3, curvature=lambda s: 0.2 + 0.1 * s, signal=signals.smooth(0.0, 1.0)),
         Damping(rolling=0.1, torsion=0.05),
         Torque(0.2, signals.smooth(0.0, 1.0), at=0.0),
     )
