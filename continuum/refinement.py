@@ -21,7 +21,7 @@ COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # number
 SURE = 4  # changes after which slowly falling errors count as such
 SLOW = 3.0  # order of errors below which fields count as rough
 FRONTS = (
-    "; errors fall slowly: loads or rest shapes that start at once, against the conditions at an end, send fronts along the rod; "
+    "; errors fall slowly: loads that start at once, at a point or against the condition at an end, send fronts along the rod; "
     "start them smoothly, as by signals.smooth"
 )
 PLACES = 1024  # nodes of a solution, or a multiple

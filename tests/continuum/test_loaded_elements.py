@@ -29,6 +29,16 @@ def ring(*loads):
     return replace(bent(*loads), initial=initial, closed=True, turns=1)
 
 
+def wavy(*loads):
+    """A closed wavy line along x, where the springs of its seam pull across it."""
+
+    def initial(s):
+        a = 2 * np.pi * s / 3.2
+        return s, 0.3 * np.sin(a), 0 * s, 0.2 + 0 * s, np.arctan(0.6 * np.pi / 3.2 * np.cos(a)), 0 * s
+
+    return replace(bent(*loads), initial=initial, closed=True, shift=(3.2, 0.0))
+
+
 def field(scene, tol=1e-7, frames=3):
     return solve(scene, tol, frames=frames, progress=False)
 
@@ -60,6 +70,7 @@ CASES = {
         Motor(0.0, at=2.0),
         twist=0.0,
     ),
+    "wavy": wavy(Spring(lambda s: s, 0.1, 0.5), Spring(0.0, 0.0, 0.3, at=0.0), Slope(0.0, -0.2)),
     "ring": ring(Spring(0.2, 0.1, lambda s: 0.4 + 0.1 * np.cos(2 * np.pi * s / 3.2)), Torque(0.2, SMOOTH, at=0.8), Damping(0.1)),
 }
 
