@@ -12,6 +12,8 @@ from discs import simulate
 from discs.loads import Damping, Motor, Torque
 from tests.continuum.test_loaded_fields import ROD, SMOOTH, UNEVEN, field, straight, waves
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(params=["field", "unit"])
 def rolling(request):

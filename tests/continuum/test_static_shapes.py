@@ -12,6 +12,8 @@ from continuum import Rod, Scene, SteeredRod, solve
 from discs import Chain, Midpoint, Problem, State, simulate
 from discs.loads import Damping, Motor, Rest, Slope
 
+pytestmark = pytest.mark.slow
+
 LENGTH, SMALL = 3.0, 3e-4
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.8, "length": LENGTH}
 R, BETA, K, PULL = 0.8, 0.9, 0.5, 1.3 * 0.8 * SMALL

@@ -48,6 +48,7 @@ def test_a_bent_rod_that_turns_dissipates_nothing(model):
     assert bending > 0.1
 
 
+@pytest.mark.slow
 def test_viscosity_damps_bending_waves_like_an_oscillator():
     """A straight periodic rod, y = R theta: M theta.. = -(beta t + K R^2 t^2) theta - eta R^2 t^2 theta., t = 4 sin^2(q k/2)/k^2.
 
@@ -74,6 +75,7 @@ def curvature_energy(problem: Problem, q, rest) -> float:
     return 0.5 * chain.k * float(np.sum(chain.bending_stiffness * np.abs(off) ** 2 + chain.torsion_stiffness * twist**2))
 
 
+@pytest.mark.slow
 def test_rest_curvatures_add_up_and_drivers_do_the_work_of_the_bends():
     """Energy from its formula, also beside a load in NumPy; and -int m . J r' kappa_0. over the motion, by quadrature of frames."""
     problem = uneven(7, Model("ring", "field"))
