@@ -61,7 +61,8 @@ def solve(
     fall below 1e-4 of its largest value).
 
     Loads of a scene with slaved headings: "spectral" takes those of `continuum.load_terms` (see `continuum.weak`), "richardson" all
-    that discs take, "leapfrog" those with a potential. Steps do not jump over signals (`continuum.timing`).
+    that discs take, "leapfrog" those with a potential. Those of a `SteeredRod`: `continuum.element_loads`. Steps do not jump over
+    signals (`continuum.timing`).
 
     Parameters
     ----------

@@ -291,7 +291,10 @@ def test_a_scene_without_loads_computes_none():
         ),
         ((Torque(lambda s: 1.0 if s > 1 else 0.0),), r"pattern of Torque 0 raised ValueError: .* an array of \d+ places s, from"),
         ((Torque(lambda s: np.where(s > 1, np.nan, s)),), r"pattern of Torque 0 must be finite; got nan at s = 1\.0"),
-        ((Motor(0.0, at=1.0),), r"Motor: at s = 1 it makes a corner inside the rod.*; drive an end, or take method='richardson'"),
+        (
+            (Motor(0.0, at=1.0),),
+            r"Motor: at s = 1 it makes a corner inside the rod.*; drive an end, or take a SteeredRod, or discs",
+        ),
         ((Motor(0.3, at=0.0),), r"Motor: its rate at t = 0 must be the initial omega at s = 0, 0; got 0\.3"),
         ((Motor(signals.pulse(0.5, 0.1), at=3.0),), r"Motor: its rate jumps at t = 0\.5"),
         ((Custom(lambda t, q, v: q),), r"Custom: the spectral solver has no form of it; take method='richardson'"),
