@@ -114,8 +114,7 @@ class Integrator(ABC):
     stability_limit : largest h Omega for the fastest oscillation Omega; infinite if there is none.
     offers : names of further quantities at frames, see `extras`.
     takes_loads : whether it takes all loads, or only those that are part of the energy.
-    takes_motors : whether it takes discs whose rate is given.
-    damps : whether it damps oscillations that its steps do not resolve.
+    takes_motors, damps : whether it takes discs whose rate is given, and whether it damps oscillations that steps do not resolve.
     adaptive : whether it chooses its own steps; below, h is then the longest step.
     """
 
