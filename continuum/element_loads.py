@@ -146,7 +146,9 @@ class ElementLoads:
         self.driven = np.array([axle.row - ROLL for axle in terms.axles], dtype=int), np.array(ends, dtype=int)
         self.timing = Timing(scene)
         initial = [scene.fields(np.array([axle.at]))["omega" if axle.row == ROLL else "phi_rate"][0] for axle in terms.axles]
-        self.motors = Motors(terms.axles, self.timing, scene.duration, np.array(initial))
+        self.motors = Motors(
+            terms.axles, self.timing, scene.duration, np.array(initial), scene.rod.length if scene.closed else np.inf
+        )
 
     def values(self, t: float) -> Float:
         """The signals of the drives and the rates of the motors, (L + motors,)."""

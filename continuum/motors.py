@@ -21,7 +21,7 @@ class Axle(NamedTuple):
 
 
 class Motors:
-    """The motors of a scene.
+    """The motors of a scene; places a `period` apart, on a closed one, are one place.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Motors:
         rates that jump, which would take infinite torques.
     """
 
-    def __init__(self, axles: Sequence[Axle], timing: Timing, duration: float, initial: Float) -> None:
+    def __init__(self, axles: Sequence[Axle], timing: Timing, duration: float, initial: Float, period: float = np.inf) -> None:
         self.axles, self._duration = tuple(axles), duration
         for i, (axle, rate, given) in enumerate(zip(axles, self.rates(np.zeros(1))[0], initial, strict=True)):
             if not abs(given - rate) <= 1e-9 * max(1.0, abs(rate)):
@@ -42,7 +42,7 @@ class Motors:
                     f"Motor: its rate at t = 0 must be the initial {name} at s = {axle.at:g}, {given:g}; got {rate:g}: "
                     "change one, or start the motor smoothly"
                 )
-            if axle[:2] in [other[:2] for other in self.axles[:i]]:
+            if any(axle.row == other.row and (axle.at - other.at) % period in (0.0, period) for other in self.axles[:i]):
                 raise ValueError(f"Motor: s = {axle.at:g} has two motors about the same axis; leave one out")
         short = 1e-9 * duration
         for t in timing.stops[:-1] if axles else ():

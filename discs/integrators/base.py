@@ -115,6 +115,7 @@ class Integrator(ABC):
     offers : names of further quantities at frames, see `extras`.
     takes_loads : whether it takes all loads, or only those that are part of the energy.
     takes_motors, damps : whether it takes discs whose rate is given, and whether it damps oscillations that steps do not resolve.
+    back : the longest substep back in time, over h.
     adaptive : whether it chooses its own steps; below, h is then the longest step.
     """
 
@@ -126,6 +127,7 @@ class Integrator(ABC):
     offers: ClassVar[tuple[str, ...]] = ()
     takes_loads: ClassVar[bool] = True
     takes_motors: ClassVar[bool] = False
+    back: ClassVar[float] = 0.0
     damps: ClassVar[bool] = False
     adaptive: ClassVar[bool]
 

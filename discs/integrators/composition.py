@@ -34,6 +34,9 @@ class Composition(OneStep, ABC):
     stability_limit: ClassVar[float] = np.inf
     takes_motors: ClassVar[bool] = True
 
+    def __init_subclass__(cls) -> None:
+        cls.back = -min(cls.fractions)
+
     def __post_init__(self) -> None:
         if not isinstance(self.base, Midpoint):
             raise ValueError(f"base must be a Midpoint; got {checks.shown(self.base)}")

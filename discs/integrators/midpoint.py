@@ -30,7 +30,8 @@ class Midpoint(OneStep):
         (I + h^2/4 C^T S C) p = pi_n - h/2 C^T S q_n.
 
     A sweep solves it and evaluates C again at the new midpoint. The energy is exact after any number of sweeps, since H is
-    quadratic and both equations have the same C. The step is the midpoint rule, and reversible, once the sweeps have converged.
+    quadratic and both equations have the same C (with motors or viscosity of bending, which are taken where the last sweep began,
+    once the sweeps have converged). The step is the midpoint rule, and reversible, once the sweeps have converged.
 
     If V is not quadratic, the secant of the step replaces S, and the energy is exact only once the sweeps have converged. The
     matrix then affects only their convergence, and the one of the first sweep is used for all sweeps of a step. (Measured on rods

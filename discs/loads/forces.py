@@ -6,7 +6,7 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
-from discs.loads.binding import Discs, OnRod, Pattern, spread
+from discs.loads.binding import Discs, OnRod, Pattern, places, spread
 from discs.loads.linear import Linear
 from discs.loads.signals import Signal
 
@@ -87,6 +87,8 @@ class Spring(OnRod):
         if (stiffness < 0).any():
             raise ValueError(f"stiffness of Spring must be at least 0; got {stiffness.min():g}")
         x, y = (self._place(name, value, chain) for name, value in (("x", self.x), ("y", self.y)))
+        if self.at is not None and chain.ends == "ring" and self.at > chain.length - chain.k / 2:
+            x, y = x - chain.shift[0], y - chain.shift[1]  # the disc at s = 0 is that at s = length one period back
         return Linear(
             constant=spread(chain, {0: stiffness * x, 1: stiffness * y}),
             stiffness=spread(chain, {0: stiffness, 1: stiffness}),
@@ -95,4 +97,4 @@ class Spring(OnRod):
         )
 
     def _place(self, name: str, value: Pattern, chain: Discs) -> Float:
-        return self._sampled(name, value if self.at is None else self._number(name, value), chain.s)
+        return self._sampled(name, value if self.at is None else self._number(name, value), places(chain))

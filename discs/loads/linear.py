@@ -79,6 +79,8 @@ class Linear(Load):
             if not np.isfinite(value).all() or (name != "constant" and (value < 0).any()):
                 raise ValueError(f"{name} must be finite{'' if name == 'constant' else ' and at least 0'}; got {value}")
             object.__setattr__(self, name, np.array(value))
+        if self.viscosity is not None and self.constant.ndim != 2:
+            raise ValueError(f"constant, damping or stiffness must be (rows, discs) if viscosity is given; got {self.constant}")
         if self.viscosity is not None:
             links, need = np.array(self.viscosity, dtype=float), (len(self.constant) - 2, self.constant.shape[-1] + 1)
             if links.shape != need or not np.isfinite(links).all() or (links < 0).any():

@@ -9,7 +9,7 @@ from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory, Tally
 from discs.loads.motor import Held
 from discs.problem import Problem
-from discs.running.rounding import warn_of_lost_digits
+from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
@@ -77,6 +77,8 @@ class March:
             warn(problem.ill_posed)
         if integrator.stability_limit == np.inf and not integrator.adaptive:
             warn_of_lost_digits(self.system, h)
+        if integrator.back:
+            warn_of_growth(problem, integrator.name, integrator.back, h)
         self.memory: Memory = integrator.begin(self.system, problem.start(), h, self.work, self.parameters)
         if self.parameters is not None:
             self._prepare(quiet)

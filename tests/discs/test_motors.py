@@ -1,5 +1,6 @@
 """Motors and held discs: against multipliers, closed forms and the balance of energy."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -125,11 +126,13 @@ def test_methods_that_take_no_motors_say_so(method):
 
 @pytest.mark.parametrize("method", ["suzuki4", "kahanli6"])
 def test_steps_back_in_time_take_motors_and_stiff_dampers(method):
-    """The matrix of such a step is not positive definite; against Gauss steps, which go forward only."""
+    """The matrix of such a step is not positive definite; against Gauss steps, which go forward only. Dampers are warned of."""
     problem = driven(KINDS[0])
     stiff = replace(problem, loads=(Damping(rolling=1e3),))
     for loaded, near in ((problem, 1e-4), (stiff, 1e-5)):
-        run, other = (simulate(loaded, name, 0.02, 2, engine="plain", progress=False) for name in (method, "gauss6"))
+        with pytest.warns(UserWarning, match="substeps back in time amplify") if loaded is stiff else nullcontext():
+            run = simulate(loaded, method, 0.02, 2, engine="plain", progress=False)
+        other = simulate(loaded, "gauss6", 0.02, 2, engine="plain", progress=False)
         assert np.isfinite(run.theta).all()
         for name in ("x", "y", "theta"):
             gap = np.abs(getattr(run, name) - getattr(other, name)).max()

@@ -1,0 +1,76 @@
+"""Loads where they are easily wrong: dampers against substeps back in time, seams of rings, ends of rods."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from continuum import Scene, SteeredRod, solve
+from discs import Chain, KahanLi6, Problem, State, simulate
+from discs.chains.twist import untwisting_chain
+from discs.loads import Damping, Linear, Motor, Spring, Torque, signals
+from discs.simulation import doubted
+from tests.conftest import Model, uneven
+
+STRAIGHT = {"length": 4.0, "density": 1.0, "spin_inertia": 1.0, "torsion_stiffness": 0.8, "bending_stiffness": 0.7, "radius": 1.0}
+
+
+def test_substeps_back_in_time_amplify_fast_dampers(kernels_as_python):
+    """One disc's roll decays at the rate c/(alpha + rho R^2); the composition is wrong where a midpoint substep back has a pole."""
+    problem = replace(uneven(5, Model("springs", "field")), loads=(Damping(rolling=30.0),), duration=0.5)
+    fast = 2 / (0.25 * -min(KahanLi6.fractions))
+    with pytest.warns(UserWarning, match=f"kahanli6: its substeps back in time amplify .* near {fast:.3g} per unit"):
+        simulate(problem, "kahanli6", 0.25, frames=2, progress=False, engine="plain")
+    slow = replace(problem, loads=(Damping(rolling=0.1),))
+    run = simulate(slow, "kahanli6", 0.05, frames=2, progress=False, engine="plain")  # without a warning
+    assert run.dissipated[-1] > 0
+
+
+def test_dampers_that_give_energy_are_told():
+    problem = replace(uneven(5, Model("springs", "field")), loads=(Damping(rolling=1.0),), duration=0.5)
+    run = simulate(problem, "midpoint", 0.05, frames=6, progress=False, engine="plain")
+    assert not doubted(problem, run)
+    balance = run.balance.copy()
+    balance[3:, 1] -= 0.5 * balance[-1, 1]
+    energy = run.energy + (run.balance - balance)[:, 1]  # the balance stays exact
+    said = doubted(problem, replace(run, balance=balance, energy=energy))
+    assert "dampers only take energy, but between two frames they gave" in said
+
+
+@pytest.mark.parametrize("at", [0.0, 0.05, 3.95, 4.0])
+def test_a_spring_at_the_seam_of_a_periodic_rod_holds_the_disc_that_is_there(at):
+    s = np.arange(16) / 4
+    chain = Chain(**STRAIGHT, n=16, ends="ring", shift=(4.0, 0.0))
+    spring = Spring(x=0.0 if at < 2 else 4.0, y=0.0, stiffness=5.0, at=at)
+    problem = Problem(chain, State(s, 0 * s, 0 * s), 1.0, (spring,))
+    assert problem.energy() == 0
+    assert np.abs(problem.system.load.force(0.0, problem.start().hi, np.zeros((3, 16)))).max() == 0
+
+
+def test_two_motors_at_a_seam_are_one_place():
+    rod = SteeredRod(**STRAIGHT, stretch_stiffness=5.0, shear_stiffness=5.0, heading_inertia=0.3)
+    rate = signals.smooth(0.0, 1.0)
+    motors = (Motor(rate, at=0.0), Motor(rate, at=4.0))
+    scene = Scene(
+        rod=rod,
+        duration=1.0,
+        initial=lambda s: (s, 0 * s, 0 * s, 0 * s, 0 * s, 0 * s),
+        closed=True,
+        rolling="unit",
+        shift=(4.0, 0.0),
+        loads=motors,
+    )
+    with pytest.raises(ValueError, match="two motors about the same axis"):
+        solve(scene, tol=1e-2, progress=False)
+
+
+def test_patterns_are_not_read_beyond_the_end():
+    problem = untwisting_chain(38, duration=0.1, length=0.3)
+    assert problem.chain.s[-1] > 0.3  # by rounding
+    problem = replace(problem, loads=(Torque(lambda s: np.sqrt(0.3 - s)),))
+    assert np.isfinite(problem.system.load.force(0.0, problem.start().hi, 0 * problem.start().hi)).all()
+
+
+def test_viscosity_alone_does_not_say_how_many_rows_there_are():
+    with pytest.raises(ValueError, match=r"must be \(rows, discs\) if viscosity is given"):
+        Linear(viscosity=np.ones((1, 6)))
