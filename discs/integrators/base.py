@@ -115,8 +115,7 @@ class Integrator(ABC):
     offers : names of further quantities at frames, see `extras`.
     takes_loads : whether it takes all loads, or only those that are part of the energy.
     takes_motors, damps : whether it takes discs whose rate is given, and whether it damps oscillations that steps do not resolve.
-    back : the longest substep back in time, over h.
-    adaptive : whether it chooses its own steps; below, h is then the longest step.
+    adaptive : whether it chooses its own steps; below, h is then the longest step. back : longest substep back in time, over h.
     """
 
     name: ClassVar[str]
