@@ -14,7 +14,10 @@ from discs.loads import Damping, Force, Motor, Rest, Slope, Spring, Torque, sign
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("name", scenes())
+SHORT = "rolling resistance", "driven end", "rest curvature", "ring, torque", "own, actuated", "varying rod"  # run by `make test`
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in SHORT else pytest.mark.long) for name in scenes()])
 def test_loaded_discs_tend_to_the_loaded_field(name):
     """Rings and own headings at order 2; consistent ends at 1.8 to 2.3 here, and at 1.97 to 2.1 from 513 to 1025 discs.
 

@@ -49,7 +49,7 @@ def test_a_driven_end_moves_the_rod_as_linear_waves_do():
 DRIVEN = Motor(lambda t: 0.8 * float(SMOOTH(t)), at=0.0), Motor(0.0, at=3.0), Damping(rolling=0.1, torsion=0.1), Torque(0.2, SMOOTH)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_chains_tend_to_the_field_with_a_driven_and_a_held_end(rolling):
     """Order 2, in the torques of both motors and in their work too."""
     scene = replace(untwisting_rod(rolling, **UNEVEN, twist=0.0, duration=1.5), loads=DRIVEN)

@@ -194,6 +194,8 @@ def test_centre_line_and_torsion_know_nothing_of_each_other():
     assert orders(errors) == pytest.approx(2.0, abs=0.05), errors
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_against_a_thin_rod_of_pyelastica():
     """A three-dimensional Cosserat rod that shears and stretches: what it differs by falls like the square of its thickness."""
     elastica = pytest.importorskip("elastica")
