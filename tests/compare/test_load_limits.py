@@ -72,7 +72,7 @@ def test_loaded_discs_converge_to_the_loaded_field(load):
     field = solve(scene, 1e-6, frames=[2.0], progress=False)
     errors = []
     for n in (65, 129):
-        run = simulate(lump(scene, n, ends="consistent"), "suzuki4", dt=0.02, frames=[2.0], progress=False)
+        run = simulate(lump(scene, n, ends="consistent"), "gauss6", dt=0.02, frames=[2.0], progress=False)
         every = (field.s.size - 1) // (n - 1)
         errors.append(max(np.abs(getattr(run, name) - getattr(field, name)[:, ::every]).max() for name in ("x", "y", "theta")))
     assert 1.85 < np.log2(errors[0] / errors[1]) < 2.15
