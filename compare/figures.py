@@ -74,13 +74,13 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
 def loads(found: Mapping[str, Sequence[Study]]) -> Axes:
     """Largest error of any field against the number of discs, a line for each load, a panel for each kind of ends."""
     ends = list(dict.fromkeys(study.ends for studies in found.values() for study in studies))
-    figure = Figure(figsize=(4.2 * len(ends), 4.6), layout="constrained")
+    figure = Figure(figsize=(4.2 * len(ends), 6.2), layout="constrained")
     axes = figure.subplots(1, len(ends), squeeze=False, sharey=True)[0]
     for ax, kind in zip(axes, ends, strict=True):
         shown = [(name, study) for name, studies in found.items() for study in studies if study.ends == kind]
         colours = GREY, ORANGE, BLUE, GREEN, PURPLE, INK
         for i, (name, study) in enumerate(shown):
-            style = {"color": colours[i % len(colours)], "linestyle": "-" if i < len(colours) else "--"}
+            style = {"color": colours[i % len(colours)], "linestyle": ("-", "--", "-.")[i // len(colours) % 3]}
             ax.loglog(study.n, study.error.max(axis=1), marker="o", markersize=4, label=name, **style)
         n = shown[0][1].n[[0, -1]].astype(float)
         level = min(study.error[0].max() for _, study in shown)
@@ -91,7 +91,7 @@ def loads(found: Mapping[str, Sequence[Study]]) -> Axes:
         ax.xaxis.set_major_formatter(ScalarFormatter())
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.grid(alpha=0.3, which="major")
-        ax.legend(fontsize=8)
+        ax.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))  # below: no line is covered
     axes[0].set_ylabel("largest error over discs and fields (length, rad)")
     first: Axes = axes[0]
     return first

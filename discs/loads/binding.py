@@ -40,7 +40,7 @@ class OnRod(ABC):
     def _shared(self, chain: Discs, at: float | None, **patterns: Pattern) -> list[Float]:
         """Patterns per length times the shares of the discs, (n,); numbers for the disc nearest to `at`, if that is given."""
         if at is None:
-            return [self._sampled(name, pattern, places(chain)) * chain.w for name, pattern in patterns.items()]
+            return [self._sampled(name, pattern, within(chain, chain.s)) * chain.w for name, pattern in patterns.items()]
         disc = self._disc(chain, at)
         return [np.where(np.arange(chain.n) == disc, self._number(name, value), 0.0) for name, value in patterns.items()]
 
@@ -87,9 +87,9 @@ def given(pattern: Pattern) -> bool:
     return callable(pattern) or bool(np.any(pattern))
 
 
-def places(chain: Discs) -> Float:
-    """Places of the discs along the rod, (n,), not beyond its end by rounding."""
-    return np.minimum(chain.s, chain.length)
+def within(chain: Discs, places: Float) -> Float:
+    """Places along the rod, (m,), not beyond its end by rounding."""
+    return np.minimum(places, chain.length)
 
 
 def spread(chain: Discs, rows: Mapping[int, ArrayLike]) -> Float:

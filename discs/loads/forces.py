@@ -6,7 +6,7 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
-from discs.loads.binding import Discs, OnRod, Pattern, places, spread
+from discs.loads.binding import Discs, OnRod, Pattern, spread, within
 from discs.loads.linear import Linear
 from discs.loads.signals import Signal
 
@@ -97,4 +97,4 @@ class Spring(OnRod):
         )
 
     def _place(self, name: str, value: Pattern, chain: Discs) -> Float:
-        return self._sampled(name, value if self.at is None else self._number(name, value), places(chain))
+        return self._sampled(name, value if self.at is None else self._number(name, value), within(chain, chain.s))

@@ -9,7 +9,7 @@ from discs.arrays import Float
 from discs.chains import stencils
 from discs.chains.chain import SteeredChain
 from discs.loads.bends import bends_of
-from discs.loads.binding import Discs, OnRod, Pattern, given, signal_of, spread
+from discs.loads.binding import Discs, OnRod, Pattern, given, signal_of, spread, within
 from discs.loads.linear import Drive, Linear
 from discs.loads.signals import Signal
 
@@ -59,7 +59,7 @@ class Rest(OnRod):
                 if given(getattr(self, name)):
                     self._needs_headings(chain, name)
             if given(self.curvature):
-                curvature = self._sampled("curvature", self.curvature, chain.bends)
+                curvature = self._sampled("curvature", self.curvature, within(chain, chain.bends))
                 if chain.link_law.quadratic:
                     bends = bends_of(chain, curvature=curvature)
                 else:
