@@ -65,7 +65,7 @@ def peers(problem: Problem) -> list[Peer]:
         found += reduced.sundials_peers(problem, f)
     if n <= 128:
         found.append(multipliers.saddle_peer(problem))
-    if problem.system.parameters is None or curvature != "linear":
+    if problem.system.parameters is None or curvature != "linear" or problem.chain.degree != 1:
         return found
     if find_spec("sksundae"):
         found.append(multipliers.multiplier_peer(problem))

@@ -25,6 +25,7 @@ KIND = {
     "paper": "the paper's ends",
     "ring": "ring",
     "own": "own headings",
+    "elements": "elements of three",
 }
 LAW = {"field": "field law", "unit": "unit law", "own": "own headings"}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
@@ -47,7 +48,7 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
             ax.plot(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
     # the two slopes, each beside the curves that should have it
     first = [s for s in studies if s.ends == "springs" and s.scene.rod.curvature == "linear"]
-    slopes = [(1, s, 1.7) for s in first] + [(2, s, 0.5) for s in studies if s not in first]
+    slopes = [(1, s, 1.7) for s in first] + [(4 if s.ends == "elements" else 2, s, 0.5) for s in studies if s not in first]
     for slope, study, beside in slopes:
         n = study.n[-3:].astype(float)
         level = study.error[-1].max() if beside > 1 else study.error[-1].min()

@@ -9,7 +9,7 @@ from compare.results import Study, compared
 from continuum import Scene, solve
 from continuum.mesh import viscous
 from continuum.solver import spline
-from discs import Gauss6, Integrator, Midpoint, Problem, Solution, Suzuki4, checks, simulate
+from discs import Gauss6, Gauss8, Integrator, Midpoint, Problem, Solution, Suzuki4, checks, simulate
 from discs.arrays import Float, Int
 
 
@@ -22,6 +22,7 @@ def convergence(
     method: str | Integrator | None = None,
     tol: float = 1e-5,
     progress: bool = True,
+    degree: int = 1,
 ) -> Study:
     """Simulate a scene with n = n_1, n_2, ... discs and compare with the field at the end.
 
@@ -31,9 +32,10 @@ def convergence(
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame must be at the end of the scene.
     dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
-    method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscous bending.
+    method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscous bending, "gauss8" for degree 2.
+    degree : see `lump`.
     """
-    sizes, problems = checked_sizes(scene, n, ends)
+    sizes, problems = checked_sizes(scene, n, ends, degree)
     if field is None:
         field = solve(scene, tol, frames=2, progress=progress)
     if field.error_estimate is None or not np.isclose(field.t[-1], scene.duration, rtol=1e-12):
@@ -42,7 +44,8 @@ def convergence(
         )
     h = scene.duration / max(300, 8 * field.stats.get("steps", 0)) if dt is None else checks.number("dt", dt, positive=True)
     if method is None:
-        method = Gauss6(tolerance=1e-10) if viscous(scene) else Suzuki4(Midpoint(tolerance=1e-10))
+        composed = Gauss6(tolerance=1e-10) if viscous(scene) else Suzuki4(Midpoint(tolerance=1e-10))
+        method = Gauss8(tolerance=1e-13) if degree == 2 else composed
     fields = compared(scene)
     limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in fields}
     error = np.empty((len(problems), len(fields)))
@@ -53,15 +56,15 @@ def convergence(
             error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
     floor = max(field.error_estimate[name] for name in fields)
     k = np.array([problem.chain.k for problem in problems])
-    return Study(scene, problems[0].chain.ends, sizes, k, error, floor, h)
+    return Study(scene, "elements" if degree == 2 else problems[0].chain.ends, sizes, k, error, floor, h)
 
 
-def checked_sizes(scene: Scene, n: ArrayLike, ends: str) -> tuple[Int, list[Problem]]:
+def checked_sizes(scene: Scene, n: ArrayLike, ends: str, degree: int = 1) -> tuple[Int, list[Problem]]:
     """The sizes of a study and their problems; ValueError if they are not increasing or too small."""
     sizes = np.atleast_1d(np.asarray(n))
     if sizes.ndim != 1 or not sizes.size or sizes.dtype.kind not in "iu" or (np.diff(sizes) <= 0).any():
         raise ValueError(f"n must be increasing whole numbers of discs; got {n!r}")
-    return sizes, [lump(scene, int(size), ends) for size in sizes]
+    return sizes, [lump(scene, int(size), ends, degree) for size in sizes]
 
 
 def _periodic(scene: Scene, name: str, run: Solution) -> Float:

@@ -71,7 +71,7 @@ def run_solve(options: argparse.Namespace) -> None:
 
 def run_discs(options: argparse.Namespace) -> None:
     """The command `discs`."""
-    command_line.run_discs(semidiscretise(_scene(options), options.n, options.ends), options)
+    command_line.run_discs(semidiscretise(_scene(options), options.n, options.ends, options.degree), options)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -11,7 +11,7 @@ from continuum.pieces import POINTS
 from continuum.rod import PARAMETERS, Scene, SteeredRod
 from discs import Chain, Problem, State, SteeredChain, checks
 from discs.arrays import Float
-from discs.chains import stencils
+from discs.chains import elements, stencils
 from discs.files.schema import ROD
 from discs.loads import Damping
 from discs.loads.binding import given
@@ -24,7 +24,7 @@ def viscous(scene: Scene) -> bool:
     return any(given(load.bending) for load in scene.loads if isinstance(load, Damping))
 
 
-def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
+def semidiscretise(scene: Scene, n: int, ends: str, degree: int = 1) -> Problem:
     """The field equations of a scene on n nodes, as the problem of n discs.
 
     A node with its share of length is a disc, a finite difference of the potential is a spring. With the stencils of
@@ -35,6 +35,7 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     ----------
     n : number of nodes, both ends counted, or all around a ring.
     ends : "consistent" (second order), "springs" (first order) or "paper" (the paper's, first order).
+    degree : 2 for steered discs as quadratic elements (`discs.chains.elements`), of order four instead of two.
     """
     if not isinstance(scene, Scene):
         raise ValueError(f"a Scene is wanted, such as untwisting_rod(); got {type(scene).__name__}")
@@ -47,8 +48,9 @@ def semidiscretise(scene: Scene, n: int, ends: str) -> Problem:
     common = {name: 1.0 if name in rod.varying else getattr(rod, name) for name in names} | {"length": rod.length}
     chain: Chain | SteeredChain
     if isinstance(rod, SteeredRod):
-        chain = SteeredChain(n=n, ends=ends, shift=scene.shift, turns=scene.turns, **common)
+        chain = SteeredChain(n=n, ends=ends, shift=scene.shift, turns=scene.turns, degree=degree, **common)
     else:
+        elements.refuse(degree)
         chain = Chain(n=n, ends=ends, shift=scene.shift, rolling=scene.rolling, curvature=rod.curvature, **common)
     if rod.varying:
         at = places(chain)
@@ -66,6 +68,8 @@ def places(chain: Chain | SteeredChain) -> dict[str, Float]:
         int (alpha + rho |e|^2) omega psi   ->  sum over discs, rho, alpha and R (of e) at the discs,
         int beta theta' psi'                ->  sum over links, beta at their middles, and so K phi' chi', A, G of own headings,
         int K r'' . (e psi)''               ->  sum over bends, K at their discs; consistent ends have bends with K(0), K(length).
+
+    Of degree 2 (`discs.chains.elements`) the rules are Simpson's for discs and Gauss's for strain points, of order 4.
 
     Smooth functions multiply the terms, so this holds as for a uniform rod. The end conditions of the field need nothing more: they
     are natural, and a consistent end has the trapezoidal sum, ghost disc included, of the integral that they follow from. Averages
@@ -127,6 +131,7 @@ def unseen(scene: Scene, problem: Problem) -> str:
         place, width = min(found.features, key=lambda feature: feature[1])
         where = f", which vary within {width:.2g} at s = {place:.4g}"
         enough = max(enough, int(np.ceil(2 * scene.rod.length / width)))
+    enough += chain.degree == 2 and enough % 2 != chain.n % 2  # whole elements
     what = f"{missed[0]} of the rod" if missed[0] in scene.rod.varying else "initial fields"
     return (
         f"{problem.chain.n} discs are too few for the {what}{where}: they miss {lost:.3g} of {whole:.3g}, the {missed[0]}; "

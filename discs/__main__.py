@@ -49,7 +49,7 @@ def parser() -> argparse.ArgumentParser:
 def run_twist(options: argparse.Namespace) -> None:
     """The command `run`."""
     given = {name: value for name in PAPER | STEERED if (value := getattr(options, name)) is not None}
-    problem = untwisting_chain(options.n, options.rolling, options.ends, options.t, options.twist, **given)
+    problem = untwisting_chain(options.n, options.rolling, options.ends, options.t, options.twist, options.degree, **given)
     command_line.run_discs(problem, options)
 
 

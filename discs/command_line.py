@@ -39,6 +39,13 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
         help="how the free ends are treated (default: springs)",
     )
     p.add_argument(
+        "--degree",
+        metavar="P",
+        type=int,
+        default=1,
+        help="2: discs with headings of their own in elements of three, errors fall like 1/N^4, not 1/N^2 (default: 1)",
+    )
+    p.add_argument(
         "--method",
         choices=("auto", *METHODS),
         metavar="NAME",

@@ -48,8 +48,8 @@ def exudyn_steered(problem: Problem, dt: float, frames: int = 2, spectral_radius
     RuntimeError : if Newton's method fails.
     """
     chain = problem.chain
-    if not isinstance(chain, SteeredChain) or chain.ends != "springs":
-        raise ValueError("exudyn_steered takes a SteeredChain with ends='springs'")
+    if not isinstance(chain, SteeredChain) or (chain.ends, chain.degree) != ("springs", 1):
+        raise ValueError("exudyn_steered takes a SteeredChain of degree 1 with ends='springs'")
     if not dt > 0 or frames < 2:
         raise ValueError(f"dt must be positive and frames at least 2; got {dt!r} and {frames!r}")
     apart = max(1, int(np.ceil(problem.duration / (frames - 1) / dt - 1e-9)))

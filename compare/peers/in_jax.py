@@ -68,8 +68,8 @@ def _in_jax(problem: Problem) -> Callable[[Any], Any]:
     import jax.numpy as jnp
 
     chain, system = problem.chain, problem.system
-    if chain.ends not in ("springs", "paper"):
-        raise ValueError("the JAX form of the equations is written for plain free ends")
+    if chain.ends not in ("springs", "paper") or chain.degree != 1:
+        raise ValueError("the JAX form of the equations is written for plain free ends and degree 1")
     headings: dict[str, Callable[[Any], Any]] = {"field": lambda z: z, "unit": lambda z: z / jnp.hypot(z[0], z[1])}
     if isinstance(chain, Chain):  # laws are written in NumPy, which JAX does not trace
         checks.choice("rolling (diffrax)", chain.rolling, headings)

@@ -2,13 +2,21 @@
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
 from discs.arrays import Float, Int
 from discs.skew import Parameters, Placed, Secant, Shape, SkewGradient
+
+
+class Joined(NamedTuple):
+    """One of the discs that each strain joins: its index, and its share in the difference and in the mean heading, (n_links,)."""
+
+    disc: Int
+    slope: Float | float
+    mean: Float | float
 
 
 class RollingDiscs(SkewGradient):
@@ -151,18 +159,22 @@ class RollingDiscs(SkewGradient):
 
     def _viscous(self, viscosity: Float, c: Float) -> Float:
         """Upper bands of C^T B^T (viscosity) B C."""
+        strains = [np.stack([slope * a[disc] for disc, slope, _ in self._joined], axis=1)[:, None, :] for a in c[2:]]
+        links = len(self._joined[0].disc)
+        return self._neighbours(*zip(strains, viscosity[:, 1 : 1 + links, None], strict=True))
+
+    @cached_property
+    def _joined(self) -> tuple[Joined, ...]:
+        """The discs that a strain of a link joins."""
         first = np.arange(self.n - (not self.closed))
-        second = (first + 1) % self.n
-        strains = [np.stack([-a[first], a[second]], axis=1)[:, None, :] for a in c[2:]]
-        return self._neighbours(*zip(strains, viscosity[:, 1 : 1 + first.size, None], strict=True))
+        return Joined(first, -1.0, 0.5), Joined((first + 1) % self.n, 1.0, 0.5)
 
     @cached_property
     def _neighbours(self) -> "Assembly":
         """For strains that join the rolls, or the turns, of neighbours."""
-        first = np.arange(self.n - (not self.closed))
-        place = np.arange(self.n) if self._inverse_order is None else self._inverse_order
-        pairs = np.stack([first, (first + 1) % self.n], axis=1)
-        return Assembly(*(place[pairs + column * self.n] for column in range(len(self.rows) - 2)))
+        place = np.arange(self.n * (len(self.rows) - 2)) if self._inverse_order is None else self._inverse_order
+        discs = np.stack([disc for disc, _, _ in self._joined], axis=1)
+        return Assembly(*(place[discs + column * self.n] for column in range(len(self.rows) - 2)))
 
 
 def _sum(a: Any, b: Any) -> Any:

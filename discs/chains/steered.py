@@ -28,9 +28,9 @@ from typing import NamedTuple
 import numpy as np
 
 from discs.arrays import Float, Int
-from discs.chains import stencils
+from discs.chains import elements, stencils
 from discs.chains.chain import SteeredChain
-from discs.chains.rolling_discs import Assembly, RollingDiscs, folded
+from discs.chains.rolling_discs import Assembly, Joined, RollingDiscs, folded
 from discs.skew import Load, Parameters, Placed
 
 
@@ -38,6 +38,7 @@ class Links(NamedTuple):
     """Shape of a steered chain.
 
     d : (4, n_links), differences of neighbours. middle : (n_links,), mean headings of links. phi : (n,), headings.
+    For elements of degree 2, d and middle at their strain points, see `discs.chains.elements`.
     """
 
     d: Float
@@ -61,13 +62,13 @@ class SteeredSystem(RollingDiscs):
 
     rows = ("x", "y", "theta", "phi")
     quadratic = False
-    reach = 1
     vanishing = False
 
     def __init__(self, chain: SteeredChain, load: Load | None = None) -> None:
         self.n, self._k, self._ends, self._chain = chain.n, chain.k, chain.ends, chain
         self.load = load
         self.closed = chain.ends == "ring"
+        self.reach = self._degree = chain.degree
         self.scale = np.array([chain.length, chain.length, 1.0, 1.0])
         self._shift = np.array([*chain.shift, 0.0, 2 * np.pi * chain.turns])
         self._radius = np.asarray(chain.radius)
@@ -76,7 +77,8 @@ class SteeredSystem(RollingDiscs):
         self._roots = np.sqrt(np.array([spin + mass * self._radius**2, turn]))
         stiff = chain.stretch_stiffness, chain.shear_stiffness, chain.torsion_stiffness, chain.bending_stiffness
         self._stiffness = chain.k * np.array(stiff)
-        self.stiffest = 4 * float(np.max(self._stiffness) / np.min(self._roots) ** 2) / chain.k**2
+        norm = 4 * 4 / 3 if chain.degree == 2 else 4  # of B^T B: at most 4 for links, and 4/3 for `elements.mixed` squared
+        self.stiffest = norm * float(np.max(self._stiffness) / np.min(self._roots) ** 2) / chain.k**2
 
     # Kinematics
 
@@ -96,11 +98,15 @@ class SteeredSystem(RollingDiscs):
             phi = phi + lo[3]
         if self._ends == "ring":
             d[:, -1] += self._shift
-        return Links(d, self._middle(phi, self._shift[3]), phi)
+        return Links(*self._strained(d, self._middle(phi, self._shift[3])), phi)
+
+    def _strained(self, d: Float, middle: Float) -> tuple[Float, Float]:
+        """Differences and mean headings of links, where strains are taken."""
+        return elements.at_points(d, middle) if self._degree == 2 else (d, middle)
 
     def moved(self, shape: Links, dq: Float) -> Links:
-        d = shape.d + stencils.links(dq, self._ends)
-        return Links(d, shape.middle + self._middle(dq[3], 0.0), shape.phi + dq[3])
+        d, middle = self._strained(stencils.links(dq, self._ends), self._middle(dq[3], 0.0))
+        return Links(shape.d + d, shape.middle + middle, shape.phi + dq[3])
 
     def slope(self, shape: Links) -> Float:
         return np.array([np.cos(shape.phi), np.sin(shape.phi)])
@@ -170,8 +176,10 @@ class SteeredSystem(RollingDiscs):
         tension[0] = secant.along[0, 0] * stress[0] + secant.along[1, 0] * stress[1]
         tension[1] = secant.along[0, 1] * stress[0] + secant.along[1, 1] * stress[1]
         tension[2:] = stress[2:] / self._k
-        force = stencils.pull(tension, self._ends)
         couple = 0.5 * (secant.across * stress[:2]).sum(axis=0)
+        if self._degree == 2:
+            tension, couple = elements.on_links(tension, couple)
+        force = stencils.pull(tension, self._ends)
         if self._ends == "ring":
             force[3] += couple + np.roll(couple, 1)
         else:
@@ -188,29 +196,26 @@ class SteeredSystem(RollingDiscs):
         return np.stack([discs, discs + self.n], axis=1).ravel()
 
     @cached_property
-    def _sides(self) -> tuple[Int, Int]:
-        first = np.arange(self._stiffness.shape[1])
-        return first, (first + 1) % self.n
+    def _joined(self) -> tuple[Joined, ...]:
+        return super()._joined if self._degree == 1 else tuple(map(Joined._make, elements.joined(self.n, self.closed)))
 
     @cached_property
     def _assembly(self) -> Assembly:
         place = np.argsort(self.order)
-        first, second = self._sides
-        return Assembly(np.stack([place[first], place[first + self.n], place[second], place[second + self.n]], axis=1))
+        return Assembly(np.stack([place[disc + row] for disc, _, _ in self._joined for row in (0, self.n)], axis=1))
 
     def stiffness(self, secant: Section, c: Float) -> Float:
-        first, second = self._sides
-        b = np.zeros((first.size, 4, 4))
-        for roll, disc, sign in ((0, first, -1.0), (2, second, 1.0)):
-            b[:, :2, roll] = sign * (secant.along * c[:2, disc]).sum(axis=1).T
-            b[:, :2, roll + 1] = (0.5 * secant.across * c[3, disc]).T
-            b[:, 2, roll] = sign / self._k * c[2, disc]
-            b[:, 3, roll + 1] = sign / self._k * c[3, disc]
+        b = np.zeros((self._stiffness.shape[1], 4, 2 * len(self._joined)))
+        for i, (disc, slope, mean) in enumerate(self._joined):
+            b[:, :2, 2 * i] = (slope * (secant.along * c[:2, disc]).sum(axis=1)).T
+            b[:, :2, 2 * i + 1] = (mean * secant.across * c[3, disc]).T
+            b[:, 2, 2 * i] = slope / self._k * c[2, disc]
+            b[:, 3, 2 * i + 1] = slope / self._k * c[3, disc]
         return self._assembly((b, self._stiffness.T))
 
     @cached_property
     def parameters(self) -> Parameters:
-        if self.load is not None and self.load.parameters is None:
+        if self._degree == 2 or (self.load is not None and self.load.parameters is None):
             return None
         from discs.kernels import steered  # numba is slow to import
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
+from discs.chains import elements
 from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import ROLLING
 from discs.problem import Problem, State
@@ -41,7 +42,13 @@ def twisted(s: Float, length: float, amplitude: float) -> tuple[Float, Float, Fl
 
 
 def untwisting_chain(
-    n: int, rolling: str = "field", ends: str = "springs", duration: float = DURATION, twist: float = TURNS, **parameters: Any
+    n: int,
+    rolling: str = "field",
+    ends: str = "springs",
+    duration: float = DURATION,
+    twist: float = TURNS,
+    degree: int = 1,
+    **parameters: Any,
 ) -> Problem:
     """The paper's scene: n discs in a straight line, at rest, twisted by theta = -pi twist cos(pi s/length).
 
@@ -52,6 +59,7 @@ def untwisting_chain(
     ends : of a `Chain`; "springs" for own headings.
     duration : time to simulate.
     twist : turns between the two ends.
+    degree : of a `SteeredChain`; 1 for other chains.
     parameters : of the chain; by default the paper's, with J = 0.25 and A = G = 10 for own headings.
 
     Raises
@@ -64,6 +72,8 @@ def untwisting_chain(
         checks.choice("parameter of the chain" + (" (own headings)" if steered else ""), name, standard)
     given: dict[str, Any] = {"n": n, "ends": ends} | standard | parameters
     checks.choice("ends (a straight rod)", ends, ("springs",) if steered else ("springs", "consistent", "paper"))
-    chain: Chain | SteeredChain = SteeredChain(**given) if steered else Chain(**given, rolling=rolling)
+    if not steered:
+        elements.refuse(degree)
+    chain: Chain | SteeredChain = SteeredChain(**given, degree=degree) if steered else Chain(**given, rolling=rolling)
     x, y, theta, omega = twisted(chain.s, chain.length, np.pi * checks.number("twist", twist))
     return Problem(chain, State(x, y, theta, omega, phi=0 * x if steered else None), duration)

@@ -48,4 +48,4 @@ class Damping(OnRod):
         viscosity[:, 1 : 1 + links[0].size] = np.array(links) / chain.k
         viscosity[:, 0] = viscosity[:, -1]
         damping = spread(chain, dict(enumerate(rates, start=2)))
-        return Linear(damping=damping, viscosity=viscosity if viscosity.any() else None, bends=bends)
+        return Linear(damping=damping, viscosity=viscosity if viscosity.any() else None, bends=bends, degree=chain.degree)

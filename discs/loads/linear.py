@@ -8,6 +8,7 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
+from discs.chains.elements import mixed
 from discs.loads import signals
 from discs.loads.bends import Bends
 from discs.loads.signals import Signal
@@ -49,6 +50,7 @@ class Linear(Load):
     drives : the parts that depend on time.
     section : see `Load`; the load then has no compiled form.
     bends : rest curvature and viscosity of bending of slaved headings, whose force and potential are added; None for none.
+    degree : of the chain's elements, where there is viscosity: for 2, B v and its transpose are those of `discs.chains.elements`.
     floor : a lower bound of the potential, or of its sum with that of the springs; None for the one where stiffness q = constant.
 
     Raises
@@ -66,6 +68,7 @@ class Linear(Load):
     section: Any = None
     bends: Bends | None = None
     floor: float | None = None
+    degree: int = 1
 
     def __post_init__(self) -> None:
         names = ("constant", "damping", "stiffness")
@@ -122,7 +125,7 @@ class Linear(Load):
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = self.constant - self.damping * v - self.stiffness * q
         if self.viscosity is not None:
-            found[2:] += np.diff(self.viscosity * self._apart(v))
+            found[2:] += np.diff(self._mixed(self.viscosity * self._apart(v)))
         if self.bends is not None:
             found[:2] += self.bends.force(self._curvature(t), q) + self.bends.drag(q, v)
         for drive in self.drives:
@@ -142,14 +145,24 @@ class Linear(Load):
     def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
         return None if self.bends is None else self.bends.bands(self._curvature(t), q, c, d, g)
 
-    @staticmethod
-    def _apart(v: Float) -> Float:
-        """Differences of neighbours in the rows from theta on, (columns, n + 1), around a ring."""
-        return np.diff(v[2:], prepend=v[2:, -1:], append=v[2:, :1])
+    def _apart(self, v: Float) -> Float:
+        """Differences of neighbours in the rows from theta on, (columns, n + 1), around a ring; of degree 2 at strain points."""
+        return self._mixed(np.diff(v[2:], prepend=v[2:, -1:], append=v[2:, :1]))
+
+    def _mixed(self, links: Float) -> Float:
+        """From links to strain points and back, (columns, n + 1), link j before disc j; n is odd at free ends, even on a ring."""
+        if self.degree == 1:
+            return links
+        found, ring = np.zeros_like(links), links.shape[1] % 2
+        end = links.shape[1] - (not ring)
+        found[:, 1:end] = mixed(links[:, 1:end])
+        if ring:
+            found[:, 0] = found[:, -1]
+        return found
 
     @cached_property
     def parameters(self) -> Any:
-        if self.section is not None:
+        if self.section is not None or (self.degree == 2 and self.viscosity is not None):
             return None
         from discs.kernels import load
         from discs.kernels.bends import NO_BENDS

@@ -53,7 +53,7 @@ class Rest(OnRod):
             curvature = self._sampled("curvature", self.curvature, chain.middles)
             rows[3] = np.asarray(chain.bending_stiffness) * curvature
             strain[1] = np.sqrt(np.asarray(chain.bending_stiffness) * chain.k) * curvature
-            section, closing = self._section(chain), 2 * np.pi * chain.turns * float(rows[3][-1])
+            section, closing = self._section(chain), 2 * np.pi * chain.turns * float(chain.tension(rows[3])[-1])
         else:
             for name in ("stretch", "shear", "mounting_angle"):
                 if given(getattr(self, name)):
@@ -64,7 +64,7 @@ class Rest(OnRod):
                     bends = bends_of(chain, curvature=curvature)
                 else:
                     section = curvature
-        pattern = spread(chain, {row: stencils.pull(moment, chain.ends) for row, moment in rows.items()})
+        pattern = spread(chain, {row: stencils.pull(chain.tension(moment), chain.ends) for row, moment in rows.items()})
         if self.signal is None:
             return Linear(constant=pattern, offset=-closing, strain=strain, section=section, bends=bends, floor=0.0)
         if section is not None:

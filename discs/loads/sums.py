@@ -87,6 +87,7 @@ def _linear(loads: list[Linear]) -> Linear:
         strain=sum(load.strain for load in loads),
         drives=tuple(drive for load in loads for drive in load.drives),
         floor=_floor(loads),
+        degree=max(load.degree for load in loads),
     )
 
 

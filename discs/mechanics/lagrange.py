@@ -85,8 +85,9 @@ def _moves(problem: Problem) -> int:
 
 def _pieces(problem: Problem) -> Float:
     """Pieces of the chain that torsion springs join, (pieces, n), one or zero."""
-    n = problem.chain.n
-    first = np.flatnonzero(problem.chain.torsion_stiffness)
+    n, degree = problem.chain.n, problem.chain.degree
+    whole = np.asarray(problem.chain.torsion_stiffness).reshape(-1, degree).any(axis=1)  # links, or elements of two
+    first = np.flatnonzero(np.repeat(whole, degree))
     links = scipy.sparse.coo_array((np.ones(first.size), (first, (first + 1) % n)), shape=(n, n))
     count, piece = scipy.sparse.csgraph.connected_components(links, directed=False)
     found: Float = (piece == np.arange(count)[:, None]).astype(float)
