@@ -9,6 +9,7 @@ from continuum.mesh import semidiscretise
 from continuum.rod import Scene
 from continuum.scenes import untwisting_rod
 from continuum.solver import solve
+from continuum.wants import ARRAYS
 from discs import command_line
 
 
@@ -33,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     field.add_argument(
         "--frames", metavar="F", type=int, default=101, help="number of frames, equally spaced in time (default: 101)"
     )
+    field.add_argument("--want", metavar="NAME", nargs="+", default=[], help=f"give also {', '.join(ARRAYS)} (default: none)")
     command_line.add_loads(field)
     command_line.add_saving(field)
     field.set_defaults(run=run_solve)
@@ -61,7 +63,7 @@ def run_solve(options: argparse.Namespace) -> None:
     scene = _scene(options)
     scene = replace(scene, loads=scene.loads + command_line.given_loads(options))
     command_line.clear_way(options, whole=True)
-    field = solve(scene, options.tol, options.method, options.n, options.dt, options.frames, not options.quiet)
+    field = solve(scene, options.tol, options.method, options.n, options.dt, options.frames, not options.quiet, want=options.want)
     if options.save:
         field.save(options.save)
     print(command_line.summary(field))

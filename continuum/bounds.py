@@ -9,10 +9,13 @@ HEADINGS = ("phi", "phi_rate")  # of a `SteeredRod`
 LEAST = 1e-12  # smallest tolerance: some thousand times the rounding of a position
 
 
-def bounds(tol: float | Mapping[str, float], steered: bool) -> dict[str, float]:
-    """The error bounds that `tol` of `continuum.solve` sets: a number for positions and angles, a mapping for what it names."""
-    known = (*FIELDS, *HEADINGS) if steered else FIELDS
-    usual = tuple(name for name in known if name not in ("omega", "phi_rate"))
+def bounds(tol: float | Mapping[str, float], steered: bool, more: tuple[str, ...] = ()) -> dict[str, float]:
+    """The error bounds that `tol` of `continuum.solve` sets: a number for positions and angles, a mapping for what it names.
+
+    more : names of wanted quantities, which a mapping may bind, too.
+    """
+    fields = (*FIELDS, *HEADINGS) if steered else FIELDS
+    known, usual = (*fields, *more), tuple(name for name in fields if name not in ("omega", "phi_rate"))
     return checks.tolerances(tol, known, usual, LEAST)
 
 

@@ -92,7 +92,7 @@ class Elements:
         return self.scene.rod.at(self.s)
 
     @cached_property
-    def _stiffness(self) -> Float:
+    def stiffness(self) -> Float:
         """Of stretch, shear, torsion and bending on the elements, (4, P, DEGREE + 1)."""
         there, shape = self.scene.rod.at(self.grid.places), self.grid.places.shape
         found = there.stretch_stiffness, there.shear_stiffness, there.torsion_stiffness, there.bending_stiffness
@@ -109,23 +109,42 @@ class Elements:
         """Kinetic and potential energy of (6, n), with rest strains (4, P, DEGREE + 1)."""
         rod = self._at_nodes
         u, twist, bend, _ = self._strains(q)
-        density = (self._stiffness * (np.stack([u[0] - 1, u[1], twist, bend]) - rest) ** 2).sum(axis=0)
+        density = (self.stiffness * (np.stack([u[0] - 1, u[1], twist, bend]) - rest) ** 2).sum(axis=0)
         kinetic = self.grid.weights @ (rod.inertia * q[4] ** 2 + rod.heading_inertia * q[5] ** 2)
         own = 0.0 if self.loads is None else self.loads.energy(q)
         return own + 0.5 * float((self.grid.w * density).sum() + kinetic)
 
-    def _torques(self, q: Float, values: Float) -> tuple[Float, Float, Float]:
-        """Of (6, n) and values of signals: torques about the axles and the vertical, but for motors (2, n); e (2, n); and
-        omega' and phi.' on the elements (2, P, DEGREE + 1), without loads 0."""
-        loads, w, bent = self.loads, self.grid.w, np.zeros(1)
-        u, twist, bend, (cos, sin) = self._strains(q)
+    def stresses(self, q: Float, values: Float) -> tuple[Float, Float, tuple[Float, Float, Float]]:
+        """Of (6, n) and values of signals: strains less those at rest, and stresses, (4, P, DEGREE + 1); also d_1 and
+        Gamma + (1, 0) (2, P, DEGREE + 1), and omega' and phi.' alike, without loads 0."""
+        loads, bent = self.loads, np.zeros(1)
+        u, twist, bend, along = self._strains(q)
         strain = np.stack([u[0] - 1, u[1], twist, bend])
         if loads is not None:
             strain -= loads.at_rest(values)
-        stress = self._stiffness * strain
+        stress = self.stiffness * strain
         if loads is not None:
             bent = self.grid.slope(q[4:, self.grid.index])
             stress[2:] += loads.viscosity * bent
+        return strain, stress, (along, u, bent)
+
+    def spins(self, t: float, q: Float) -> tuple[Float, Float]:
+        """omega. at the nodes (n,) at a time, and the torques about the axles of motors at the two ends (2,)."""
+        loads, reaction = self.loads, np.zeros(2)
+        torque, inertia = self._torques(q, NONE if loads is None else loads.values(t))[0][0], self._inertia[0]
+        spin: Float = torque / inertia
+        if loads is not None and loads.motors.axles:
+            for row, node, change in zip(*loads.driven, loads.motors.changes(np.array([t]))[0], strict=True):
+                if row == 0:
+                    spin[node] = change
+                    reaction[min(node, 1)] = change * inertia[node] - torque[node]
+        return spin, reaction
+
+    def _torques(self, q: Float, values: Float) -> tuple[Float, Float, Float]:
+        """Of (6, n) and values of signals: torques about the axles and the vertical, but for motors (2, n); e (2, n); and
+        omega' and phi.' as in `stresses`."""
+        loads, w = self.loads, self.grid.w
+        _, stress, ((cos, sin), u, bent) = self.stresses(q, values)
         n1, n2 = stress[:2]
         flux = np.stack([cos * n1 - sin * n2, sin * n1 + cos * n2, stress[2], stress[3]])
         local = -(w * flux / self.grid.half) @ self.grid.d.T
@@ -150,7 +169,7 @@ class Elements:
         if loads is None:
             return out.ravel()
         out[4:][loads.driven] = 0.0  # `held` sets these rates
-        power = loads.power(values, out[:4], self._stiffness[2:], bent)
+        power = loads.power(values, out[:4], self.stiffness[2:], bent)
         power[0] -= torque[loads.driven] @ q[4:][loads.driven]
         return np.concatenate([out.ravel(), power])
 

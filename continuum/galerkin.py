@@ -72,8 +72,8 @@ class SpectralRod(SkewGradient):
 
     Attributes
     ----------
-    law : the law of rolling.
-    closed : whether the rod is closed.
+    scene : the scene. law : its law of rolling. closed : whether the rod is closed.
+    shift : mean slope of a closed rod, a complex number.
     twist : (n,), the moment f of the initial twist.
     loads : the loads of the scene, None if there are none.
     crossing : the time in which a wave as long as the rod crosses it, over 2 pi, where it is fastest.
@@ -86,7 +86,7 @@ class SpectralRod(SkewGradient):
     def __init__(self, scene: Scene, n: int, density: Density | None = None) -> None:
         rod = scene.rod
         self.closed = scene.closed
-        self.n, self.law, self._scene = n, ROLLING[scene.rolling], scene
+        self.n, self.law, self.scene = n, ROLLING[scene.rolling], scene
         self.functions = (waves if scene.closed else polynomials)(n, density or Density(rod.length))
         nodes, self._rolls = rod.at(self.functions.s), np.ones(())  # radius at the nodes over self._radius
         mass, bending, torsion, self._radius = nodes.density, nodes.bending_stiffness, nodes.torsion_stiffness, 1.0
@@ -103,7 +103,7 @@ class SpectralRod(SkewGradient):
         self._mass, self._spin = self.functions.w * mass, self.functions.w * nodes.spin_inertia
         stiffest = float(np.max(nodes.torsion_stiffness * rod.length**2 + nodes.bending_stiffness * nodes.radius**2))
         self.crossing = rod.length**2 * np.sqrt(float(np.min(nodes.inertia)) / stiffest) if stiffest else np.inf
-        self._shift = complex(*scene.shift) / rod.length  # mean slope of a closed rod; z is the slope of the series plus this
+        self.shift = complex(*scene.shift) / rod.length  # mean slope of a closed rod; z is the slope of the series plus this
         self.twist, self._offset = np.zeros(n), 0.0
         initial = resolve(scene)
         self.loads = weak(initial, self.functions, DATA + n // 2) if scene.loads else None
@@ -124,7 +124,7 @@ class SpectralRod(SkewGradient):
             mass=self._mass,
             spin=self._spin,
             scale=self.scale,
-            shift=self._shift,
+            shift=self.shift,
             radius=float(self._radius),
             rolling=self.law.parameters,
             modes=None,
@@ -138,7 +138,7 @@ class SpectralRod(SkewGradient):
 
     def _start(self, initial: Resolved) -> Phase:
         """The initial state. Also sets the twist, and the constant of V that makes the energy that of the initial fields."""
-        scene, functions, order = self._scene, self.functions, DATA + self.n // 2
+        scene, functions, order = self.scene, self.functions, DATA + self.n // 2
         s, w = initial.quadrature(order)
         fields, ends = scene.fields(s), np.array([0.0, scene.rod.length])
         at_ends, beta = scene.fields(ends), scene.rod.at(s).torsion_stiffness
@@ -151,7 +151,7 @@ class SpectralRod(SkewGradient):
         if functions.ends:
             a[: functions.ends] = at_ends["x"] + 1j * at_ends["y"]
         root, line = np.sqrt(w), functions.line(s)
-        rest = fields["x"] + 1j * fields["y"] - self._shift * s - line[:, : functions.ends] @ a[: functions.ends]
+        rest = fields["x"] + 1j * fields["y"] - self.shift * s - line[:, : functions.ends] @ a[: functions.ends]
         a[functions.ends :] = np.linalg.lstsq(root[:, None] * line[:, functions.ends :], root * rest, rcond=None)[0]
         q = np.array([a.real, a.imag, np.zeros(self.n)])
         omega = functions.field(s).T @ (w * fields["omega"]) / functions.w
@@ -169,9 +169,9 @@ class SpectralRod(SkewGradient):
     def slopes(self, z: Phase) -> Complex:
         """r' at the nodes as complex numbers, (..., n)."""
         xy = (z.hi + z.lo)[..., :2, :] @ self.functions.bends[: self.n].T
-        return xy[..., 0, :] + 1j * xy[..., 1, :] + self._shift
+        return xy[..., 0, :] + 1j * xy[..., 1, :] + self.shift
 
-    def _omega(self, z: Phase) -> Float:
+    def omega(self, z: Phase) -> Float:
         """omega at the nodes, (..., n), as in `basis` but without the finer points."""
         e = self._radius * self.law.size(np.abs(self.slopes(z)))
         return z.pi / np.sqrt(self._spin + self._mass * e**2)
@@ -195,12 +195,12 @@ class SpectralRod(SkewGradient):
 
     def reader(self, s: Float) -> Callable[[Phase], dict[str, Float]]:
         """A function that returns x, y, theta, omega of states at places s, each (..., S). States may have leading axes."""
-        line, field, theta = self.functions.line(s), self.functions.field(s), self._scene.fields(s)["theta"]
+        line, field, theta = self.functions.line(s), self.functions.field(s), self.scene.fields(s)["theta"]
 
         def at(z: Phase) -> dict[str, Float]:
             q = z.hi + z.lo
-            x, y = q[..., 0, :] @ line.T + self._shift.real * s, q[..., 1, :] @ line.T + self._shift.imag * s
-            return {"x": x, "y": y, "theta": theta + q[..., 2, :] @ field.T, "omega": self._omega(z) @ field.T}
+            x, y = q[..., 0, :] @ line.T + self.shift.real * s, q[..., 1, :] @ line.T + self.shift.imag * s
+            return {"x": x, "y": y, "theta": theta + q[..., 2, :] @ field.T, "omega": self.omega(z) @ field.T}
 
         return at
 
@@ -224,7 +224,7 @@ class SpectralRod(SkewGradient):
         xy = shape[..., :2, :] @ self._bends
         z = xy[..., 0, :] + 1j * xy[..., 1, :]
         n, f = self.n, self.functions.project.shape[1] - self.n
-        at, slope, bend, bent = z[..., :n] + self._shift, z[..., n : n + f] + self._shift, z[..., n + f : -f], z[..., -f:]
+        at, slope, bend, bent = z[..., :n] + self.shift, z[..., n : n + f] + self.shift, z[..., n + f : -f], z[..., -f:]
         e = 1j * self._radius * self.law.jet(at, 0 * at, 0 * at)[0]
         h, h1, h2 = self.law.jet(slope, bend, bent)
         fine = np.stack([h2, 2 * h1, h], axis=-2)

@@ -32,7 +32,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import legendre
 
-from continuum.pieces import ENDS, NODES, POINTS, TINY, WEIGHTS, Cut, Data, split
+from continuum.pieces import ENDS, EXPAND, NODES, POINTS, TINY, WEIGHTS, Cut, Data, split
 from continuum.rod import Scene
 from discs.arrays import Float
 from discs.chains.links import CURVATURE
@@ -88,6 +88,17 @@ class Resolved:
         expand = (legendre.legvander(x, order - 1) * w[:, None]).T * (np.arange(order) + 0.5)[:, None]
         field = self.fields(s)[name].reshape(-1, order) @ expand.T
         found: Float = (field @ legendre.legder(np.eye(order), m).T @ legendre.legvander(x, order - 1 - m).T / half**m).ravel()
+        return found
+
+    def at(self, name: str, s: Float, m: int) -> Float:
+        """The m-th derivative of a field at places (S,)."""
+        width = np.diff(self.pieces)
+        places = (self.pieces[:-1, None] + width[:, None] / 2 * (1 + NODES)).ravel()
+        c = self.fields(places)[name].reshape(-1, POINTS) @ EXPAND.T
+        p = np.clip(np.searchsorted(self.pieces, s, side="right") - 1, 0, width.size - 1)
+        x = 2 * (s - self.pieces[p]) / width[p] - 1
+        values = legendre.legvander(x, POINTS - 1 - m) * legendre.legder(c[p], m, axis=1)
+        found: Float = values.sum(axis=1) * (2 / width[p]) ** m
         return found
 
 

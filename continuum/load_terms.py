@@ -1,8 +1,9 @@
 """The loads of a scene at places along the rod: what each load of `discs.loads` is, in the terms of `continuum.weak`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import singledispatch
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -10,8 +11,8 @@ from continuum.load_places import read
 from continuum.motors import Axle
 from continuum.rod import Scene
 from discs import checks
-from discs.arrays import Float
-from discs.loads import Damping, Force, Motor, OnRod, Rest, Slope, Spring, Torque
+from discs.arrays import Complex, Float
+from discs.loads import Damping, Force, Motor, OnRod, Rest, Slope, Spring, Torque, signals
 from discs.loads.binding import given, signal_of
 from discs.loads.signals import Signal
 
@@ -56,6 +57,14 @@ class Terms:
         self.push, self.damping = np.zeros((4, n)), np.zeros((2, n))
         self.stiffness, self.strain, self.curvature = np.zeros((3, n))
 
+    @classmethod
+    def along(cls, scene: Scene, loads: tuple[OnRod, ...], s: Float, form: Callable[[Any, Any], None] | None = None) -> Self:
+        """The loads at places (S,), per length; those at points as they are. form : adds a load, by default `add`."""
+        terms = cls(scene, s, np.ones(s.size))
+        for load in loads:
+            (form or add)(load, terms)
+        return terms
+
     def at(self, load: OnRod, name: str, least: float | None = None) -> Float:
         """A pattern at the places, (S,)."""
         return read(f"{name} of {type(load).__name__}", getattr(load, name), self.s, least)
@@ -85,10 +94,47 @@ class Terms:
         name = type(load).__name__
         self.drives.append(Drive(push, signal_of(name, load.signal), name, strain, curvature))
 
+    def _driven(self, t: Float, constant: Float, driven: list[Float | float]) -> Float:
+        """What is constant, and what the signals of the drives multiply, at times (k,), (k, S)."""
+        total: Float = np.tile(constant, (t.size, 1))
+        for drive, part in zip(self.drives, driven, strict=True):
+            total += np.outer(signals.values(drive.signal, t, drive.name), part + 0 * self.s)
+        return total
+
+    def force(self, t: Float, r: Complex) -> Complex:
+        """The forces at times (k,) on a line r = x + i y, (k, S)."""
+        push = (self._driven(t, self.push[row], [drive.push[row] for drive in self.drives]) for row in (X, Y))
+        found: Complex = next(push) + 1j * next(push) - self.stiffness * r
+        return found
+
+    def torque(self, t: Float, omega: Float) -> Float:
+        """The torques about the axles, those of rest shapes and of viscosity left out, (k, S)."""
+        found: Float = self._driven(t, self.push[ROLL], [drive.push[ROLL] for drive in self.drives]) - self.damping[0] * omega
+        return found
+
+    def rest(self, t: Float, name: str) -> Float:
+        """`strain` or `curvature` at times (k,), (k, S)."""
+        return self._driven(t, getattr(self, name), [getattr(drive, name) for drive in self.drives])
+
 
 @singledispatch
 def add(load: Any, to: Terms) -> None:
     """Add a load to the terms; a form for each class of loads."""
+
+
+def spread_and_points(scene: Scene) -> tuple[tuple[OnRod, ...], tuple[OnRod, ...]]:
+    """The loads that act along the rod, and those that act at points."""
+    points = tuple(load for load in scene.loads if getattr(load, "at", None) is not None)
+    return tuple(load for load in scene.loads if load not in points), points
+
+
+def viscosity(loads: tuple[OnRod, ...], s: Float) -> Float:
+    """The viscosity of bending at places (S,)."""
+    total = np.zeros(s.size)
+    for load in loads:
+        if isinstance(load, Damping):
+            total += read("bending of Damping", load.bending, s, 0.0)
+    return total
 
 
 def check_taken(loads: tuple[OnRod, ...]) -> None:

@@ -25,7 +25,7 @@ PLACE, WHOLE = {"s": "place", "t": "time"}, {"s": "length", "t": "duration"}  # 
 NODES, WEIGHTS = legendre.leggauss(POINTS)
 _OTHERS = 2 * np.modf(0.5 + np.arange(1, 9) * (5**0.5 - 1) / 2)[0] - 1
 _BOTH = np.concatenate([NODES, _OTHERS])
-_EXPAND = (legendre.legvander(NODES, POINTS - 1) * WEIGHTS[:, None]).T * (np.arange(POINTS) + 0.5)[:, None]
+EXPAND = (legendre.legvander(NODES, POINTS - 1) * WEIGHTS[:, None]).T * (np.arange(POINTS) + 0.5)[:, None]
 _AT_OTHERS = legendre.legvander(_OTHERS, POINTS - 1)
 ENDS = np.array([-1.0, 1.0])
 
@@ -141,7 +141,7 @@ def split(data: Sampled, edges: Float) -> Cut:
         half = (hi - lo) / 2
         values = data.read((lo[:, None] + half[:, None] * (1 + _BOTH)).ravel()).reshape(len(data.size), lo.size, -1)
         nodes = values[..., :POINTS]
-        c = nodes @ _EXPAND.T
+        c = nodes @ EXPAND.T
         misfit = np.maximum(np.abs(c[..., -3:]).max(axis=-1), np.abs(c @ _AT_OTHERS.T - values[..., POINTS:]).max(axis=-1))
         slope = (np.abs(np.diff(nodes)) / np.diff(NODES)).max(axis=-1) / half
         allowed = data.allowed[:, None] + 8 * EPS * data.length * slope  # for the rounding of places

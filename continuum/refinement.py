@@ -9,6 +9,7 @@ from tqdm import tqdm
 
 from continuum.bounds import LEAST, missed, over
 from continuum.element_grid import DEGREE
+from continuum.element_ground import ElementGround
 from continuum.elements import UNKNOWNS, Course, Elements
 from continuum.initial import resolve
 from continuum.rod import Scene
@@ -33,12 +34,18 @@ class Found(NamedTuple):
     elements: Elements
     course: Course
 
-    def sample(self, s: Float) -> Float:
-        """The unknowns at places s (S,), (6, F, S)."""
-        return np.stack([self.elements.sample(q, s) for q in self.course.q], axis=1)
+    def sample(self, s: Float, times: Float, want: tuple[str, ...]) -> dict[str, Float]:
+        """The unknowns (F, S) at places s (S,), by name, and wanted quantities."""
+        values = np.stack([self.elements.sample(q, s) for q in self.course.q], axis=1)
+        found = dict(zip(UNKNOWNS, values, strict=True))
+        if want:
+            ground = ElementGround(self.elements, s, want)
+            frames = [ground.at(float(t), q) for t, q in zip(times, self.course.q, strict=True)]
+            found |= {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+        return found
 
 
-def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
+def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool, want: tuple[str, ...] = ()) -> Solution:
     """The fields within bounds by name; the error is measured with more elements.
 
     1. Start with the fewest elements that resolve the initial fields: bounded fields within their bounds, other fields, and
@@ -78,20 +85,20 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progr
                 continue
             cells = lcm(PLACES, *(run.elements.count for run in runs))
             s = scene.rod.length / cells * np.arange(cells + (not scene.closed), dtype=float)
-            values, finer = (run.sample(s) for run in runs)
-            changes.append(np.abs(values - finer).max(axis=(1, 2)))
+            values, finer = (run.sample(s, times, want) for run in runs)
+            changes.append(np.array([np.abs(value - finer[name]).max() for name, value in values.items()]))
             if len(changes) < 2:
                 continue
             found = runs[0].elements
             last, smooth = counts.index(count), not resolve(scene).kinks
             used = counts[last - len(changes[-3:]) : last + 1]
             factors = falls(np.array(changes[-3:]), used, np.inf if smooth else 1.0)
-            estimates = zip(UNKNOWNS, factors * changes[-1] + rest, strict=True)
-            error = {name: max(float(estimate), found.misfit[name]) for name, estimate in estimates}
+            estimates = zip(values, factors * changes[-1] + rest, strict=True)
+            error = {name: max(float(estimate), found.misfit.get(name, 0.0)) for name, estimate in estimates}
             if over(error, bound) <= 1:
                 break
             order = np.inf if smooth else 2.0  # at best
-            measured = min(orders(np.array(changes[-3:]), used)[UNKNOWNS.index(name)] for name in bound)
+            measured = min(orders(np.array(changes[-3:]), used)[list(values).index(name)] for name in bound)
             fronts = bool(scene.loads) and len(changes) >= SURE and measured < SLOW
             if fronts:
                 order = max(measured, 1.0) + 0.5
@@ -105,16 +112,16 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progr
         reaction=runs[0].course.reaction,
         stats={"method": "elements", "order": DEGREE, "elements": found.grid.count, "nodes": found.n},
         error_estimate=error,
-        **dict(zip(UNKNOWNS, values, strict=True)),
+        **values,  # type: ignore[arg-type]  # none of them is one of the above
     )
 
 
 def falls(changes: Float, counts: Sequence[int], most: float) -> Float:
-    """The ratios of the error on the last count but one to the last change, (6,).
+    """The ratios of the error on the last count but one to the last change, (fields,).
 
     Parameters
     ----------
-    changes : (m, 6), two or three changes between the counts (m + 1,).
+    changes : (m, fields), two or three changes between the counts (m + 1,).
     most : largest order p.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -123,7 +130,7 @@ def falls(changes: Float, counts: Sequence[int], most: float) -> Float:
 
 
 def orders(changes: Float, counts: Sequence[int]) -> Float:
-    """The orders p at which changes fall, (6,); arguments are as for `falls`."""
+    """The orders p at which changes fall, (fields,); arguments are as for `falls`."""
     with np.errstate(divide="ignore", invalid="ignore"):
         found: Float = np.nan_to_num(np.log(changes[0] / changes[-1]) / np.log(counts[-2] / counts[-len(changes) - 1]))
     return found

@@ -1,7 +1,7 @@
 """The solver for fields: `solve(scene, ...)`, to a tolerance or by the paper's scheme."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from continuum.refinement import solve_elements
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
 from continuum.timing import Timing
+from continuum.wants import arrays, check_want
 from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.arrays import Float, Spline
 from discs.running.frames import frame_times
@@ -35,6 +36,7 @@ def solve(
     dt: float | None = None,
     frames: int | ArrayLike = 101,
     progress: bool = True,
+    want: Iterable[str] = (),
 ) -> Solution:
     """The fields of a scene.
 
@@ -74,18 +76,23 @@ def solve(
     frames : number of frames, equally spaced over the duration with both ends, or their times. They cost little: frames within a
         step of the spectral field are evaluated on its collocation polynomial.
     progress : show progress on anything that takes over a second.
+    want : further quantities (docs/ground-force.md): "velocity", "slope", and, of "spectral" and "elements", "contact_force" (per
+        length, with end_force and end_couple at free ends), "energy_density" and "energy_flux". `tol` may bind their arrays, too:
+        {"theta": 1e-5, "end_couple": 1e-3}.
 
     Returns
     -------
-    Solution on the nodes `s`. `error_estimate` has the errors of x, y, theta, omega, for a `SteeredRod` of phi and phi_rate, and of
-    the energy: its largest distance over all frames from the energy of the initial fields, by quadrature (with loads, that of
-    energy - work + dissipated). The steps of the spectral field conserve the energy to rounding (and to the tolerance of sweeps).
-    At frames within steps it is the energy of the interpolated fields, and has their error.
+    Solution on the nodes `s`. `error_estimate` has the errors of x, y, theta, omega, for a `SteeredRod` of phi and phi_rate, of the
+    arrays of wanted quantities (the largest over nodes, frames and components), and of the energy: its largest distance over all
+    frames from the energy of the initial fields, by quadrature (with loads, that of energy - work + dissipated). The steps of the
+    spectral field conserve the energy to rounding (and to the tolerance of sweeps). At frames within steps it is the energy of the
+    interpolated fields, and has their error.
 
     Raises
     ------
-    ValueError : for a bad tolerance, method or mesh; for initial fields that jump or cannot be resolved (`continuum.initial`); if
-        the tolerance is not reached with the largest number of functions, nodes or steps of the method.
+    ValueError : for a bad tolerance, method or mesh; for a wanted quantity that the method or the scene does not have; for initial
+        fields that jump or cannot be resolved (`continuum.initial`); if the tolerance is not reached with the largest number of
+        functions, nodes or steps of the method.
     SimulationError : if the motion cannot continue; see `discs.simulate`.
     """
     if not isinstance(scene, Scene):
@@ -95,21 +102,22 @@ def solve(
     if scene.rod.curvature == "linear" and not scene.steered:
         fitting = ("spectral", *fitting)
     method = fitting[0] if method is None else checks.choice("method", method, fitting)
+    names = check_want(want, method, scene)
     energy = resolve(scene).energy
     if method == "leapfrog":
         problem = semidiscretise(scene, 32 if n is None else n, ends="paper")
         step = min(problem.chain.k**2 / 8, suggest_dt(problem, "leapfrog")) if dt is None else dt
-        want = ("modified_energy",) if problem.system.quadratic else ()
+        names += ("modified_energy",) if problem.system.quadratic else ()
         if warning := unseen(scene, problem):
             warn(warning)
-        run = simulate(problem, "leapfrog", dt=step, frames=frames, want=want, progress=progress)
+        run = simulate(problem, "leapfrog", dt=step, frames=frames, want=names, progress=progress)
         return replace(run, stats=run.stats | {"scene": scene.description()})
     if n is not None or dt is not None:
         raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
-    bound = bounds(tol, scene.steered)
+    bound = bounds(tol, scene.steered, arrays(names, scene.closed))
     times = frame_times(frames, scene.duration)
     solver = {"elements": solve_elements, "spectral": solve_spectral, "richardson": _richardson}[method]
-    found = solver(scene, bound, times, progress)
+    found = solver(scene, bound, times, progress, names)
     balance = found.energy - found.work + found.dissipated
     drift = float(np.abs(balance - (balance[0] if scene.loads else energy)).max())
     stats = found.stats | {"scene": scene.description()}
@@ -117,8 +125,8 @@ def solve(
     return replace(found, error_estimate=estimate | {"energy": estimate.get("energy", drift)}, stats=stats)
 
 
-def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progress: bool) -> Solution:
-    tol = min(bound.values())
+def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progress: bool, want: tuple[str, ...] = ()) -> Solution:
+    tol, fields = min(bound.values()), (*FIELDS, *arrays(want, scene.closed))
     # the tolerance of sweeps is far below tol, as their errors add up over the steps
     middle = Midpoint(tolerance=min(1e-10, 1e-5 * tol))
     method = middle if viscous(scene) else Suzuki4(middle)
@@ -129,11 +137,11 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
     def run(n: int, steps: int) -> Solution:
         with warnings.catch_warnings():  # too long steps show in the comparison with half as long ones
             warnings.simplefilter("ignore")
-            return simulate(mesh(n), method, scene.duration / steps, frames, progress=False)
+            return simulate(mesh(n), method, scene.duration / steps, frames, want, progress=False)
 
     def largest(a: Solution, b: Solution, factor: float) -> dict[str, float]:
         every = (b.s.size - 1) // (a.s.size - 1) if not scene.closed else b.s.size // a.s.size
-        return {f: factor * float(np.abs(getattr(b, f)[:, ::every] - getattr(a, f)).max()) for f in FIELDS}
+        return {f: factor * float(np.abs(getattr(b, f)[:, ::every] - getattr(a, f)).max()) for f in fields}
 
     def effect(whole: Solution, halved: Solution) -> dict[str, float]:
         """The error of a time step, as the half step has at most a quarter of it; infinite if sweeps did not converge."""
@@ -160,16 +168,16 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
         while over(effect(coarse, halved := shown(coarsest, 2 * steps)), bound) > 1 / 4:
             steps, coarse = 2 * steps, halved
         n, last, fastest = coarsest, None, 1 / 2 if resolve(scene).kinks else 1 / 4
-        change = space = unknown = dict.fromkeys(FIELDS, np.inf)
+        change = space = unknown = dict.fromkeys(fields, np.inf)
         while n < FINEST:
             fine = shown(2 * n - 1, steps)
-            best = _extrapolate(scene, coarse, fine)
+            best = _extrapolate(scene, fields, coarse, fine)
             before, change = change, largest(last, best, 1.0) if last is not None else unknown
-            space = {name: change[name] * _rest(change[name], before[name], fastest) for name in FIELDS}
+            space = {name: change[name] * _rest(change[name], before[name], fastest) for name in fields}
             if over(space, bound) <= 0.75:
                 # measure the step again on the coarser of the last two meshes: it has waves that the coarsest mesh has not
                 time = effect(coarse, shown(n, 2 * steps))
-                estimate = {name: space[name] + time[name] for name in FIELDS}
+                estimate = {name: space[name] + time[name] for name in fields}
                 if over(estimate, bound) <= 1:
                     stats = fine.stats | {"method": "richardson", "order": 2, "nodes": fine.s.size}
                     return replace(best, error_estimate=estimate, rolling_residual=None, stats=stats)
@@ -190,10 +198,10 @@ def _rest(change: float, before: float, fastest: float) -> float:
     return rho / (1 - rho)
 
 
-def _extrapolate(scene: Scene, coarse: Solution, fine: Solution) -> Solution:
+def _extrapolate(scene: Scene, fields: tuple[str, ...], coarse: Solution, fine: Solution) -> Solution:
     """T = u_{k/2} + (u_{k/2} - u_k)/3 on the finer nodes; a cubic spline interpolates the correction between the coarser ones."""
     changed = {}
-    for name in FIELDS:
+    for name in fields:
         u, v = getattr(fine, name), getattr(coarse, name)
         changed[name] = u + spline(scene, coarse.s, (u[:, ::2] - v) / 3)(fine.s).T
     balance = None if fine.balance is None or coarse.balance is None else fine.balance + (fine.balance - coarse.balance) / 3

@@ -17,7 +17,7 @@ theta, and q^-4 in omega. So the errors finally fall like a power of the step, t
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -26,11 +26,13 @@ from continuum.bounds import FIELDS, missed, over
 from continuum.density import Density
 from continuum.functions import unresolved
 from continuum.galerkin import SpectralRod
+from continuum.ground import Ground
 from continuum.hints import bent_hint, corner_hint, point_hint, points_inside, rough_hint
 from continuum.initial import resolve
 from continuum.pieces import POINTS
 from continuum.rod import Scene
 from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
+from continuum.wants import arrays
 from discs import SimulationError, Solution
 from discs.arrays import Float
 from discs.running.stats import Stats
@@ -73,7 +75,7 @@ class Motion(NamedTuple):
     """A motion on n functions.
 
     rod, states : the system, and its states at the times, in groups.
-    fields : (F, S) by name.
+    fields : (F, S) by name, and wanted quantities.
     start : largest error of the fields at the start, by name, and what parameters that are not resolved may add to it.
     tolerance : of a step. steps : number of steps.
     balance, reaction : (F, 2), work and dissipation, and (F, motors), torques of motors; None without loads, and motors.
@@ -98,14 +100,15 @@ class Runner:
     times : (F,), the times at which fields are compared and returned.
     stages : number of stages of a step.
     compiled : whether to use `continuum.kernels` or the plain twin.
+    want : further quantities, see `continuum.wants`.
 
     Attributes
     ----------
     s : (S,), the places at which fields are returned.
     """
 
-    def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool = True) -> None:
-        self._scene, self.times, self._compiled, self.stages = scene, times, compiled, stages
+    def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool = True, want: tuple[str, ...] = ()) -> None:
+        self._scene, self.times, self._compiled, self.stages, self._want = scene, times, compiled, stages, want
         initial, length = resolve(scene), scene.rod.length
         narrowest = min((width for _, width in initial.features), default=length)
         nodes = NODES - 1
@@ -123,6 +126,8 @@ class Runner:
         states = list(steps.at(self.times))
         every = Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
         fields = at(every)
+        if self._want:
+            fields |= self._wanted(rod, states)
         if steps.lengths:
             self._first = steps.lengths[0]
         start = distances(begun, initial)
@@ -136,10 +141,16 @@ class Runner:
             reaction = np.concatenate(steps.reaction) if rod.loads.held.size else None
         return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance, reaction)
 
+    def _wanted(self, rod: SpectralRod, states: list[Phase]) -> dict[str, Float]:
+        ground = Ground(rod, self.s, self._want)
+        ends = np.cumsum([len(z.pi) for z in states])[:-1]
+        parts = [ground.at(*group) for group in zip(np.split(self.times, ends), states, strict=True)]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
 
 def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
-    """The largest difference in each field."""
-    return {name: float(np.abs(a[name] - b[name]).max()) for name in FIELDS}
+    """The largest difference in each field that both have."""
+    return {name: float(np.abs(value - b[name]).max()) for name, value in a.items() if name in b}
 
 
 class Search:
@@ -155,13 +166,14 @@ class Search:
     estimate : estimated errors of the last motion that was measured, by field.
     """
 
-    def __init__(self, scene: Scene, bound: Mapping[str, float], times: Float, bar: tqdm) -> None:
+    def __init__(self, scene: Scene, bound: Mapping[str, float], times: Float, bar: tqdm, want: tuple[str, ...] = ()) -> None:
         self._bound, self._bar = bound, bar
         tol = min(bound.values())
         narrow = bool(resolve(scene).features)
         self._plan = NARROW if narrow else PLAN
-        self.runner = Runner(scene, times, NARROW_STAGES if narrow else stages_for(tol))
-        self.estimate = dict.fromkeys(FIELDS, np.inf)
+        self.runner = Runner(scene, times, NARROW_STAGES if narrow else stages_for(tol), want=want)
+        self.estimate = dict.fromkeys((*FIELDS, *arrays(want, scene.closed)), np.inf)
+        self._changes: dict[str, float] = {}  # of the last two motions, by name
         self._change = np.inf  # of the last two motions, over its bound
         self._ratio = np.inf  # of the last two changes
         self._pointed = bool(points_inside(scene))
@@ -239,7 +251,11 @@ class Search:
         self._ratio = self._change / before
         ratio = float(np.clip(self._ratio, LEAST, MOST)) if np.isfinite(before) else self._plan.unknown
         ratios = {name: max(ratio, RATE) if name == "omega" else ratio for name in FIELDS}
-        self.estimate = {name: max(error / (1 - ratios[name]), coarse.start[name]) for name, error in change.items()}
+        for name in change.keys() - ratios.keys():
+            earlier = self._changes.get(name, 0.0)
+            ratios[name] = min(max(change[name] / earlier, RATE), MOST) if earlier else RATE
+        self._changes = change
+        self.estimate = {name: max(error / (1 - ratios[name]), coarse.start.get(name, 0.0)) for name, error in change.items()}
         if over(self.estimate, self._bound) > 1:
             return False
         if fine.tolerance >= coarse.tolerance:  # both have the same error of steps, which the difference does not show
@@ -249,13 +265,13 @@ class Search:
         return over(self.estimate, self._bound) <= 1
 
 
-def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool) -> Solution:
+def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool, want: tuple[str, ...] = ()) -> Solution:
     """The fields of a scene with slaved headings at `times` (F,), within bounds by name; see `continuum.solve`."""
     with (
         tqdm(desc=f"field to {min(bound.values()):g}", unit="run", delay=1, disable=not progress) as bar,
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),
     ):
-        search = Search(scene, bound, times, bar)
+        search = Search(scene, bound, times, bar, want)
         try:
             found = search.result()
         except TooFast as error:
@@ -280,4 +296,5 @@ def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progr
         estimate["energy"] = float(np.abs(energy - found.balance @ (1, -1) - found.rod.start_energy).max())
     x, y, theta, omega = (found.fields[name] for name in FIELDS)
     run = Solution(times, search.runner.s, x, y, theta, omega, energy, slip, stats, error_estimate=estimate, balance=found.balance)
-    return replace(run, reaction=found.reaction)
+    wanted: dict[str, Any] = {name: found.fields[name] for name in arrays(want, scene.closed)}
+    return replace(run, reaction=found.reaction, **wanted)

@@ -45,13 +45,13 @@ from continuum.curved import Curved, forces, product
 from continuum.functions import Functions
 from continuum.initial import Resolved
 from continuum.kernels.spectral_load import NONE, Load
-from continuum.load_places import cut_patterns, point_loads, read
-from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken
+from continuum.load_places import cut_patterns, point_loads
+from continuum.load_terms import ROLL, TWIST, Terms, X, Y, add, check_taken, viscosity
 from continuum.motors import Motors
 from continuum.timing import Timing
 from continuum.viscous import Viscous
 from discs.arrays import Float, Int
-from discs.loads import Damping, signals
+from discs.loads import signals
 from discs.loads.motor import HELD
 from discs.loads.signals import Signal
 
@@ -268,8 +268,5 @@ def _curved(terms: Terms, functions: Functions) -> Curved | None:
 
 def _viscous(terms: Terms, functions: Functions) -> Viscous | None:
     """The viscosity of bending of the loads; None for none."""
-    eta = np.zeros(functions.there.size)
-    for load in terms.scene.loads:
-        if isinstance(load, Damping):
-            eta += read("bending of Damping", load.bending, functions.there, 0.0)
+    eta = viscosity(terms.scene.loads, functions.there)
     return Viscous.of(eta, functions, complex(*terms.scene.shift) / terms.scene.rod.length) if eta.any() else None

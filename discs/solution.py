@@ -90,7 +90,10 @@ class Solution(Result):
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
     contact_force : (F, 2, N), force (x, y) of the ground that keeps each disc rolling, the multiplier lambda, mass times length
-        per time squared; want "contact_force".
+        per time squared; want "contact_force". Of a field the force per length, without what acts at its ends.
+    end_force, end_couple : (F, 2, 2), [frame, end, component], force and couple of the ground at the two free ends of a field; the
+        couple is the first moment of the force about the end. None of a closed rod; want "contact_force".
+    energy_density, energy_flux : (F, N), of a field, energy per length and energy per time towards larger s; want these names.
     tension : (F, n_links), the multiplier p in the links of a free rod, force; of `continuum.free_rod`.
     work, dissipated : (F,), work of loads that are not part of the energy, and energy that dampers took, both since the start:
         energy - energy[0] = work - dissipated, to rounding for "midpoint", its compositions and the Gauss methods if V is
@@ -118,6 +121,10 @@ class Solution(Result):
     slope_x: Float | None = None
     slope_y: Float | None = None
     contact_force: Float | None = None
+    end_force: Float | None = None
+    end_couple: Float | None = None
+    energy_density: Float | None = None
+    energy_flux: Float | None = None
     tension: Float | None = None
     modified_energy: Float | None = None
     balance: Float | None = None

@@ -22,11 +22,14 @@ def ring(tmp_path):
 
 def test_solve_and_info(ring, tmp_path, capsys):
     path = tmp_path / "field.nc"
-    assert main(["solve", "--scene", str(ring), "--tol", "1e-3", "--frames", "3", "--save", str(path), "--quiet"]) == 0
+    asked = ["--tol", "1e-3", "--frames", "3", "--want", "slope", "contact_force"]
+    assert main(["solve", "--scene", str(ring), *asked, "--save", str(path), "--quiet"]) == 0
     printed = capsys.readouterr().out
     assert printed.startswith("field of the breathing ring on ")
     assert "estimated error: x " in printed
-    field = solve(breathing_ring(omega=-0.3, duration=0.4, radius=0.7), 1e-3, frames=3, progress=False)
+    field = solve(
+        breathing_ring(omega=-0.3, duration=0.4, radius=0.7), 1e-3, frames=3, want=("slope", "contact_force"), progress=False
+    )
     found = load(path)
     found.stats["seconds"] = field.stats.get("seconds")
     if field.stats.get("seconds") is None:

@@ -1,0 +1,46 @@
+"""Quantities that `solve` gives besides x, y, theta and omega where they are wanted, by the names of `Solution`."""
+
+from collections.abc import Iterable
+
+from continuum.load_places import point_loads
+from continuum.rod import Scene
+from discs.running.frames import wanted
+
+ARRAYS = {
+    "velocity": ("x_rate", "y_rate"),
+    "slope": ("slope_x", "slope_y"),
+    "contact_force": ("contact_force", "end_force", "end_couple"),
+    "energy_density": ("energy_density",),
+    "energy_flux": ("energy_flux",),
+}
+OFFERS = {
+    "spectral": tuple(ARRAYS),
+    "elements": tuple(ARRAYS),
+    "richardson": ("velocity", "slope"),
+    "leapfrog": ("velocity", "slope"),
+}
+
+
+def check_want(want: Iterable[str], method: str, scene: Scene) -> tuple[str, ...]:
+    """The names in `want`; ValueError for one that the method, or the scene, does not have."""
+    names = wanted(want, tuple(ARRAYS))
+    for name in names:
+        if name not in OFFERS[method]:
+            raise ValueError(
+                f"want: method={method!r} gives {', '.join(OFFERS[method])}; got {name!r}: take method='spectral' or 'elements' "
+                "(own headings), or for the force on discs simulate(lump(scene, n), want=...)"
+            )
+    if "contact_force" in names:
+        inside = [at for at in point_loads(scene) if scene.closed or 0 < at < scene.rod.length]
+        if inside:
+            raise ValueError(
+                f"want: with a load at the point s = {inside[0]:g} the ground has a force at that point, too, so contact_force is "
+                f"no function of s; spread it over a width, as by a pattern like exp(-((s - {inside[0]:g})/"
+                f"{scene.rod.length / 40:.2g})^2), or leave 'contact_force' out"
+            )
+    return names
+
+
+def arrays(want: tuple[str, ...], closed: bool) -> tuple[str, ...]:
+    """The arrays of wanted quantities; a closed rod has no end forces."""
+    return tuple(name for key in ARRAYS if key in want for name in ARRAYS[key] if not (closed and name.startswith("end_")))

@@ -1,0 +1,152 @@
+"""The ground's force, velocities, slopes and energy of a field: exact motions, balances, chains of discs; unequal parameters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from continuum import Rod, Scene, breathing_ring, exact, rolling_rod, solve, untwisting_rod
+from continuum.wants import ARRAYS
+from discs import load
+from discs.loads import Force, Torque
+
+ROD = {"length": 3.7, "density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.7}
+ALL = tuple(ARRAYS)
+
+
+def field(scene, tol=1e-6, want=ALL, **options):
+    return solve(scene, tol, want=want, progress=False, **options)
+
+
+def within(found, truth, name, factor=1.0, rounding=1e-8):
+    """The error of an array is within the estimate."""
+    error = np.abs(getattr(found, name) - truth).max()
+    assert error <= factor * found.error_estimate[name] + rounding, (name, error, found.error_estimate[name])
+
+
+@pytest.mark.parametrize("rolling", ["field", "unit"])
+def test_breathing_ring(rolling):
+    """r = a u, so lambda = (rho a.. + K a/a_0^4) u, and a closed rod has no ends."""
+    scene = breathing_ring(rolling, omega=-0.4, duration=0.5, **ROD)
+    found = field(scene, frames=5)
+    a0, rod = 3.7 / (2 * np.pi), scene.rod
+    step = 1e-4
+    near = [exact.ring(rod, found.t[1:-1] + d, -0.4, rolling) for d in (-step, 0.0, step)]
+    a, rate = near[1].radius, (near[2].radius - near[0].radius) / (2 * step)
+    faster = (near[0].radius - 2 * a + near[2].radius) / step**2
+    u = np.array([np.cos(found.s / a0), np.sin(found.s / a0)])
+    force = (1.3 * faster + 0.5 * a / a0**4)[:, None, None] * u
+    inner = found[1:-1]
+    within(inner, force, "contact_force", rounding=1e-6)
+    within(inner, rate[:, None] * u[0], "x_rate", rounding=1e-7)
+    within(inner, a[:, None] / a0 * u[0], "slope_y", rounding=1e-7)
+    density = 0.5 * (1.3 * rate**2 + 0.6 * near[1].omega ** 2 + 0.5 * (a / a0**2) ** 2)
+    within(inner, density[:, None] + 0 * found.s, "energy_density", rounding=1e-7)
+    assert found.end_force is None
+    assert found.end_couple is None
+
+
+def stretched(s):
+    """A straight line at rest along (0.6, 0.8), |r'| = 1 + 0.3 s - 0.01 s^3."""
+    along = s + 0.15 * s**2 - 0.0025 * s**4
+    return 0.6 * along, 0.8 * along, 0 * s, 0 * s
+
+
+@pytest.mark.parametrize("rolling", ["field", "unit"])
+def test_a_stretched_line_stays_at_rest(rolling):
+    """r'' along the line does no work on (e psi, psi): the ground holds it, by K r'''' inside, by force and couple at the ends."""
+    scene = Scene(rod=Rod(**ROD), initial=stretched, duration=0.3, rolling=rolling)
+    found = field(scene, frames=3)
+    along = np.array([0.6, 0.8])
+    within(found, -0.06 * 0.5 * along[:, None] + 0 * found.s, "contact_force", rounding=1e-5)
+    within(found, 0.5 * np.array([0.0, 0.06 * 3.7])[:, None] * along, "end_force", rounding=1e-7)
+    within(found, 0.5 * np.array([-0.3, 0.3 - 0.03 * 3.7**2])[:, None] * along, "end_couple", rounding=1e-8)
+    within(found, 0 * found.s, "energy_flux")
+
+
+def turning(s):
+    """A straight line that turns: r. = (V + s W) J r'."""
+    return s, 0 * s, 0 * s, (0.5 + 0.8 * s) / ROD["radius"]
+
+
+@pytest.mark.parametrize("rolling", ["field", "unit"])
+def test_a_straight_line_turns(rolling):
+    """Without torsion it stays straight and turns at the rate W: lambda = -rho W (V + s W) r', and nothing at the ends."""
+    scene = Scene(rod=Rod(**ROD | {"torsion_stiffness": 0.0}), initial=turning, duration=0.9, rolling=rolling)
+    found = field(scene, frames=4)
+    angle = 0.8 * found.t[:, None]
+    along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    within(found, -1.3 * 0.8 * (0.5 + 0.8 * found.s) * along, "contact_force", rounding=1e-6)
+    within(found, 0.0, "end_force", rounding=1e-7)
+    within(found, 0.0, "end_couple", rounding=1e-8)
+    within(found, -(0.5 + 0.8 * found.s) * np.sin(angle), "x_rate")
+
+
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def lopsided(s):
+    """A straight line, twisted more at one end."""
+    return s, 0 * s, 1.8 * np.cos(np.pi * s / 3.7) + 0.4 * np.cos(2 * np.pi * s / 3.7), 0.2 + 0 * s
+
+
+@pytest.mark.parametrize("rolling", ["field", "unit"])
+def test_the_ground_alone_changes_momentum(rolling):
+    """Momentum and angular momentum change by the force inside and by force and couple at the ends; energy by nothing."""
+    middle, step = 1.9, 2e-4
+    scene = Scene(rod=Rod(**ROD), initial=lopsided, duration=2.0, rolling=rolling)
+    found = field(scene, 1e-7, frames=middle + step * np.arange(-2, 3))
+    weights = np.full(found.s.size, found.s[1])
+    weights[[0, -1]] /= 2
+    weights[[0, 1, 2, -3, -2, -1]] += found.s[1] * np.array([-1 / 8, 1 / 6, -1 / 24, -1 / 24, 1 / 6, -1 / 8])  # Gregory
+
+    def rate(values):
+        return np.tensordot([1 / 12, -2 / 3, 0, 2 / 3, -1 / 12], values, 1) / step
+
+    force = found.contact_force[2].T
+    r, v = np.stack([found.x, found.y], axis=-1), np.stack([found.x_rate, found.y_rate], axis=-1)
+    z = np.array([found.slope_x[2, [0, -1]], found.slope_y[2, [0, -1]]]).T
+    ends, couple = found.end_force[2], found.end_couple[2]
+    assert np.abs(ends).max() > 0.1
+    assert np.abs(couple).max() > 0.1
+    np.testing.assert_allclose(weights @ force + ends.sum(axis=0), rate(1.3 * np.einsum("s,fsi->fi", weights, v)), atol=2e-4)
+    turn = weights @ cross(r[2], force) + (cross(r[2, [0, -1]], ends) + cross(z, couple)).sum()
+    assert turn == pytest.approx(rate(1.3 * cross(r, v) @ weights), abs=5e-4)
+    np.testing.assert_allclose(found.energy_density @ weights, found.energy, atol=1e-6)
+    np.testing.assert_allclose(found.energy_flux[:, [0, -1]], 0.0, atol=found.error_estimate["energy_flux"])
+
+
+def test_loads_at_the_ends():
+    """What pulls an end along the line is held by the ground; what pushes it across, or twists it, is not."""
+    scene = rolling_rod("unit", amplitude=0.0, duration=0.4, omega=0.0, **ROD)
+    scene = replace(scene, closed=False, shift=(0.0, 0.0), loads=(Force(-1.7, 0.0, at=0.0), Force(0.4, 0.0, at=3.7)))
+    found = field(scene, frames=3)
+    np.testing.assert_allclose(found.end_force, np.broadcast_to([[1.7, 0], [-0.4, 0]], (3, 2, 2)), atol=1e-9)
+    np.testing.assert_allclose(found.contact_force, 0.0, atol=1e-7)
+
+
+def test_bad_input():
+    scene = untwisting_rod(duration=0.1)
+    with pytest.raises(ValueError, match=r"want must be one of 'velocity', .*'energy_flux'; got 'force'"):
+        field(scene, want="force")
+    with pytest.raises(ValueError, match=r"want must be names of quantities; got 3"):
+        field(scene, want=3)
+    for method in ("richardson", "leapfrog"):
+        with pytest.raises(ValueError, match=rf"method='{method}' gives velocity, slope; got 'contact_force': take"):
+            field(scene, method=method)
+    inside = replace(scene, loads=(Torque(0.1, at=1.0),))
+    with pytest.raises(ValueError, match=r"load at the point s = 1 the ground has a force at that point, too"):
+        field(inside, want="contact_force")
+    with pytest.raises(ValueError, match=r"tol must be one of .*'end_couple'"):
+        field(scene, {"friction": 1.0}, want="contact_force")
+
+
+def test_saved(tmp_path):
+    found = field(untwisting_rod(duration=0.2), 1e-3, frames=3)
+    found.save(tmp_path / "field.nc")
+    again = load(tmp_path / "field.nc")
+    for name in (name for names in ARRAYS.values() for name in names):
+        np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
+    assert again.error_estimate == found.error_estimate
+    assert found[1:].end_force.shape == (2, 2, 2)
