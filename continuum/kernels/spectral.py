@@ -236,3 +236,8 @@ def _moved(rod, method, room, sweep, h):
         for i in range(v.shape[0]):
             copy(v[i], change[i])
     return furthest
+
+
+@fill(do.finish, Spectral)
+def _finish(rod, method, room, before, h):
+    """Nothing: `continuum.stepping` computes the work of loads, step by step as they are accepted."""

@@ -206,6 +206,15 @@ def _moved(chain: Any, method: Collocation, room: Room, sweep: int, h: float) ->
     return furthest
 
 
+@fill(do.finish, object)
+def _finish(chain: Any, method: Collocation, room: Room, before: Phase, h: float) -> None:
+    rule, moves = method.tableau, room.moves
+    if chain.load.spent.size > 0:
+        for i in range(rule.b.size):
+            combine(rule.a[i], room.v, h, moves[i])
+            do.spend(chain, before, room.times[i], h * rule.b[i], moves[i], room.v[i], 1.0)
+
+
 @fill(do.room, Collocation, _nrt=True)
 def _room(method: Collocation, chain: Any, state: Phase) -> Room:
     (rows, n), columns, s = state.hi.shape, state.pi.shape[0], method.tableau.b.size
@@ -249,8 +258,7 @@ def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Ph
         do.forwards(chain, work, c, p, v)
         moved = do.moved(chain, method, room, sweep, h)
         sweep += 1
-    for i in range(s):
-        do.spend(chain, before, times[i], h * rule.b[i], moves[i], v[i], 1.0)
+    do.finish(chain, method, room, before, h)
     move = moves[0]
     combine(rule.b, v, h, move)
     advance(before, move, 1.0, after)

@@ -127,11 +127,16 @@ def moved(chain, method, room, sweep, h):
 
 
 @stub
+def finish(chain, method, room, before, h):
+    """After the last sweep of a step from `before`: book the work of loads, at the positions and velocities of the last stages."""
+
+
+@stub
 def spend(chain, state, t, weight, move, v, scale):
     """Book the work of the loads of a chain, and what they dissipate, in a time `weight` around t, after a move from the positions
     of `state`, at the velocities `scale` v.
 
-    Also for a load, `chain.load`; nothing for chains without loads.
+    Also for a load, `chain.load`.
     """
 
 

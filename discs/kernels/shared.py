@@ -185,11 +185,6 @@ def _forces(chain, work, state, t, moves, c, p, g):
         do.pullback(chain, work, state, t[i], moves[i], c[i], p[i], g[i])
 
 
-@fill(do.spend, object)
-def _spend(chain, state, t, weight, move, v, scale):
-    pass
-
-
 @fill(do.stiffen, object)
 def _stiffen(load, state, t, move, c, d, g, matrix):
     pass

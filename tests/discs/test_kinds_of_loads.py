@@ -7,7 +7,7 @@ import pytest
 
 from continuum import untwisting_rod
 from continuum.balance import balances
-from discs import Problem, SteeredChain, simulate
+from discs import Gauss4, Midpoint, Problem, Radau3, SteeredChain, simulate
 from discs.command_line import summary
 from discs.integrators import METHODS
 from discs.loads import Custom, Damping, Force, Motor, Rest, Slope, Spring, Torque, signals
@@ -172,6 +172,20 @@ def test_energy_is_work_less_dissipation(model, engine, kernels_as_python):
         assert abs(run.work).max() > 0.05 * abs(run.energy).max()
         assert "energy - work + dissipated" in repr(run)
     assert run.stats["engine"] == engine
+
+
+def test_work_is_that_at_the_last_stages(kernels_as_python):
+    """Also of steps with few sweeps; midpoint steps balance the energy with any number of them."""
+    problem = uneven(7, KINDS[0])
+    loads = every(problem)
+    problem = replace(problem, loads=loads)
+    for method in (Midpoint(sweeps=2, tolerance=0), Gauss4(sweeps=2, tolerance=0), Radau3(sweeps=2, tolerance=0)):
+        one, other = (simulate(problem, method, 0.1, 4, progress=False, engine=e) for e in ("compiled", "plain"))
+        for name in ("work", "dissipated", "energy"):
+            np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0, atol=1e-13, err_msg=method.name)
+    problem = replace(problem, loads=tuple(replace(x, bending=0.0) if isinstance(x, Damping) else x for x in loads))
+    run = simulate(problem, Midpoint(sweeps=2, tolerance=0), 0.1, 4, progress=False)
+    assert abs(run.energy - run.energy[0] - run.work + run.dissipated).max() < 1e-13 * abs(run.energy).max()
 
 
 @models([KINDS[0], KINDS[2]])
