@@ -3,7 +3,8 @@
 The error is measured: a motion on m_j functions is compared with one on m_{j+1} functions, so each motion measures the one before.
 
 1. The tolerance of steps (`continuum.stepping`) falls for the first three motions, so that one difference shows the errors of
-   functions and of steps together. Then it is constant, and the errors of steps are measured by a separate motion.
+   functions and of steps together. Then it is constant, and the errors of steps are measured by a separate motion. So they are
+   where the finer motion took no more steps than the coarser one, as its smaller tolerance shortened none.
 2. If a difference is more than a third of the last one, a motion with shorter steps on the same functions shows which of the two
    errors dominates. If it is that of the steps, their tolerance falls again, and the number of functions goes back by one size.
 3. The finer motion has an error too. Let p be the ratio of its error to that of the coarser one. Then the difference d is (1 - p)
@@ -23,29 +24,24 @@ import numpy as np
 from tqdm import tqdm
 
 from continuum.bounds import FIELDS, missed, over
-from continuum.density import Density
-from continuum.functions import unresolved
-from continuum.galerkin import SpectralRod
-from continuum.ground import Ground
 from continuum.hints import bent_hint, corner_hint, point_hint, points_inside, rough_hint
 from continuum.initial import resolve
-from continuum.pieces import POINTS
+from continuum.motion import Motion, Runner, distances
 from continuum.rod import Scene
-from continuum.stepping import Steps, TooFast, coarser, finer, stages_for, sweeps
+from continuum.stepping import TooFast, coarser, finer, stages_for, sweeps
 from continuum.wants import arrays
 from discs import SimulationError, Solution
 from discs.arrays import Float
 from discs.running.stats import Stats
-from discs.skew import Phase
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
 SLOW, MORE = 259, (505, 707, 1001)  # from here on motions are slow, and taken only if the errors fall fast enough
-NODES = 1025  # nodes of a solution, enough for splines and their derivatives; more if the initial fields are narrow
-MOST_NODES = 8192
 LOOSEST = 2e-4  # largest tolerance of a step
 FAR = 100.0  # times the tolerance: for larger errors shorter steps are not tried
 LEAST, MOST = 1 / 3, 0.8  # limits of p, the error of a finer motion over that of the coarser one
 RATE = 0.5  # least p of omega
+WANTED = 0.5  # p of wanted quantities: the estimate is within five of the error where their own p is from -1.5 to 0.9
+MORE_STEPS = 1.2  # ratio of the numbers of steps above which two motions differ by their errors of steps
 SAME = 0.05  # relative: the end of a motion is real if two motions agree on its time to this
 
 
@@ -71,88 +67,6 @@ NARROW = Plan(more=(0.5, 2e-2, 3e-3, 3e-4, 3e-5, 2e-5), first=0.3, finer=1, slow
 NARROW_STAGES = 12
 
 
-class Motion(NamedTuple):
-    """A motion on n functions.
-
-    rod, states : the system, and its states at the times, in groups.
-    fields : (F, S) by name, and wanted quantities.
-    start : largest error of the fields at the start, by name, and what parameters that are not resolved may add to it.
-    tolerance : of a step. steps : number of steps.
-    balance, reaction : (F, 2), work and dissipation, and (F, motors), torques of motors; None without loads, and motors.
-    """
-
-    rod: SpectralRod
-    states: list[Phase]
-    fields: dict[str, Float]
-    start: dict[str, float]
-    n: int
-    tolerance: float
-    steps: int
-    balance: Float | None = None
-    reaction: Float | None = None
-
-
-class Runner:
-    """Runs motions of a scene on n functions.
-
-    Parameters
-    ----------
-    times : (F,), the times at which fields are compared and returned.
-    stages : number of stages of a step.
-    compiled : whether to use `continuum.kernels` or the plain twin.
-    want : further quantities, see `continuum.wants`.
-
-    Attributes
-    ----------
-    s : (S,), the places at which fields are returned.
-    """
-
-    def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool = True, want: tuple[str, ...] = ()) -> None:
-        self._scene, self.times, self._compiled, self.stages, self._want = scene, times, compiled, stages, want
-        initial, length = resolve(scene), scene.rod.length
-        narrowest = min((width for _, width in initial.features), default=length)
-        nodes = NODES - 1
-        while nodes < MOST_NODES and length / nodes > narrowest / 4:
-            nodes *= 2
-        self.s = length / nodes * np.arange(nodes + (not scene.closed), dtype=float)
-        self._density = Density.of(initial)
-        self._first = scene.duration / 16  # length of the first step
-
-    def run(self, n: int, tolerance: float) -> Motion:
-        rod = SpectralRod(self._scene, n, self._density)
-        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._compiled)
-        at, initial = rod.reader(self.s), self._scene.fields(self.s)
-        begun = at(rod.start)
-        states = list(steps.at(self.times))
-        every = Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
-        fields = at(every)
-        if self._want:
-            fields |= self._wanted(rod, states)
-        if steps.lengths:
-            self._first = steps.lengths[0]
-        start = distances(begun, initial)
-        if self._scene.rod.varying:
-            missed = unresolved(rod.functions, self._scene.rod, *resolve(self._scene).quadrature(POINTS))
-            start = {name: start[name] + missed * moved for name, moved in distances(fields, begun).items()}
-        balance = reaction = None
-        if rod.loads:  # what signals change of the energy is work, too
-            balance = np.concatenate(steps.balance)
-            balance[:, 0] += rod.loads.driven(self.times, every.hi + every.lo) - rod.loads.driven(np.zeros(1), rod.start.hi[None])
-            reaction = np.concatenate(steps.reaction) if rod.loads.held.size else None
-        return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance, reaction)
-
-    def _wanted(self, rod: SpectralRod, states: list[Phase]) -> dict[str, Float]:
-        ground = Ground(rod, self.s, self._want)
-        ends = np.cumsum([len(z.pi) for z in states])[:-1]
-        parts = [ground.at(*group) for group in zip(np.split(self.times, ends), states, strict=True)]
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:
-    """The largest difference in each field that both have."""
-    return {name: float(np.abs(value - b[name]).max()) for name, value in a.items() if name in b}
-
-
 class Search:
     """The search for functions and steps that reach a tolerance.
 
@@ -173,7 +87,6 @@ class Search:
         self._plan = NARROW if narrow else PLAN
         self.runner = Runner(scene, times, NARROW_STAGES if narrow else stages_for(tol), want=want)
         self.estimate = dict.fromkeys((*FIELDS, *arrays(want, scene.closed)), np.inf)
-        self._changes: dict[str, float] = {}  # of the last two motions, by name
         self._change = np.inf  # of the last two motions, over its bound
         self._ratio = np.inf  # of the last two changes
         self._pointed = bool(points_inside(scene))
@@ -235,9 +148,13 @@ class Search:
         if self._pair is None:
             return ""
         coarse, fine = self._pair
-        off = [np.abs(coarse.fields[name] - fine.fields[name]).max(axis=1) / limit for name, limit in self._bound.items()]
+        times = self.runner.times
+        off = [
+            np.abs(coarse.fields[name] - fine.fields[name]).reshape(times.size, -1).max(axis=1) / limit
+            for name, limit in self._bound.items()
+        ]
         slopes = np.concatenate([fine.rod.slopes(z) for z in fine.states])
-        return rough_hint(slopes, self.runner.times, np.max(off, axis=0) <= 1)
+        return rough_hint(slopes, times, np.max(off, axis=0) <= 1)
 
     def _run(self, n: int, tolerance: float) -> Motion:
         self._bar.set_postfix(functions=n, refresh=False)
@@ -251,18 +168,25 @@ class Search:
         self._ratio = self._change / before
         ratio = float(np.clip(self._ratio, LEAST, MOST)) if np.isfinite(before) else self._plan.unknown
         ratios = {name: max(ratio, RATE) if name == "omega" else ratio for name in FIELDS}
-        for name in change.keys() - ratios.keys():
-            earlier = self._changes.get(name, 0.0)
-            ratios[name] = min(max(change[name] / earlier, RATE), MOST) if earlier else RATE
-        self._changes = change
-        self.estimate = {name: max(error / (1 - ratios[name]), coarse.start.get(name, 0.0)) for name, error in change.items()}
+        self.estimate = {
+            name: max(error / (1 - ratios.get(name, WANTED)), coarse.start.get(name, 0.0)) for name, error in change.items()
+        }
         if over(self.estimate, self._bound) > 1:
             return False
-        if fine.tolerance >= coarse.tolerance:  # both have the same error of steps, which the difference does not show
-            shorter = self._run(coarse.n, finer(coarse.tolerance, self.runner.stages))
-            by_steps = distances(coarse.fields, shorter.fields)
+        if fine.tolerance >= coarse.tolerance or fine.steps <= coarse.steps:  # the difference does not show the error of steps
+            by_steps = distances(coarse.fields, self._shorter(coarse).fields)
             self.estimate = {name: error + by_steps[name] / (1 - LEAST) for name, error in self.estimate.items()}
         return over(self.estimate, self._bound) <= 1
+
+    def _shorter(self, motion: Motion) -> Motion:
+        """The motion on the same functions in more steps; a smaller tolerance may leave the number of a few steps as it is."""
+        tolerance, found = motion.tolerance, motion
+        for _ in range(4):
+            tolerance = finer(tolerance, self.runner.stages)
+            found = self._run(motion.n, tolerance)
+            if found.steps > MORE_STEPS * motion.steps:
+                break
+        return found
 
 
 def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool, want: tuple[str, ...] = ()) -> Solution:

@@ -126,6 +126,40 @@ def test_loads_at_the_ends():
     np.testing.assert_allclose(found.contact_force, 0.0, atol=1e-7)
 
 
+def uneven(s):
+    """A stretched line that rolls unevenly, with |r'| = 1.2 and 1.53 at the ends."""
+    return 1.2 * s + 0.1 * s**2 - 0.01 * s**3, 0 * s, 1.2 * np.cos(np.pi * s / 3.7) + 0.3 * np.cos(2 * np.pi * s / 3.7), 0.2 + 0 * s
+
+
+def wavy(s):
+    """Near to a circle, rolling unevenly."""
+    turn, a = 2 * np.pi * s / 3.7, 3.7 / (2 * np.pi)
+    return a * np.cos(turn) * (1 + 0.03 * np.cos(turn)), a * np.sin(turn), 0.2 * np.sin(turn), -0.2 + 0.1 * np.cos(turn)
+
+
+VARYING = {"density": lambda s: 1 + 0.2 * s, "torsion_stiffness": lambda s: 0.8 + 0.1 * s, "radius": lambda s: 1 - 0.05 * s}
+SCENES = {
+    "field": untwisting_rod("field", duration=3.0),
+    "unit": untwisting_rod("unit", duration=3.0),
+    "stretched field": Scene(rod=Rod(**ROD), initial=uneven, duration=1.5),
+    "ring": replace(breathing_ring("field", duration=0.6, **ROD), initial=wavy),
+    "varying": untwisting_rod("field", duration=1.5, bending_stiffness=lambda s: 0.7 + 0.1 * np.sin(s), **VARYING),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_estimates_are_within_five_of_the_errors(name):
+    scene = SCENES[name]
+    truth = field(scene, 1e-8, frames=12)
+    for tol in (1e-3, 1e-5):
+        found = field(scene, tol, frames=12)
+        for key, estimate in found.error_estimate.items():
+            if key == "energy":
+                continue
+            error = np.abs(getattr(found, key) - getattr(truth, key)).max()
+            assert error / 5 < estimate < 5 * error or error < 10 * truth.error_estimate[key], (key, tol, error, estimate)
+
+
 def test_bad_input():
     scene = untwisting_rod(duration=0.1)
     with pytest.raises(ValueError, match=r"want must be one of 'velocity', .*'energy_flux'; got 'force'"):
