@@ -22,7 +22,8 @@ and, from the second line,
     couple . e = 0,   force . e + couple . e' = tau_end + M(0) at s = 0, tau_end - M(length) at s = length.
 
 So the part of lambda across the line needs theta'' only, and it is taken from these. r'''' is needed for the part along the line,
-r''' for that of the force at an end, r'' for that of the couple. omega. is that of Galerkin's equations.
+r''' for that of the force at an end, r'' for that of the couple, where `continuum.end_identities` do not have them. omega. is
+that of Galerkin's equations.
 
 **Numerics.** r. = E W with E = i h(r') and W = R omega, the polynomial through its values at the nodes, and r.. = E. W + E W. at
 each place. m, N and M are interpolated at the nodes and differentiated there, except for theta_0, whose derivatives are those of
@@ -67,8 +68,11 @@ class Ground:
         stiffness = self._nodes.torsion_stiffness
         self._stiffer = stiffness @ self._field[1] if stiffness.ndim else 0.0  # beta'
 
-    def at(self, t: Float, z: Phase) -> dict[str, Float]:
-        """The quantities at times (k,) and states with a first axis k."""
+    def at(self, t: Float, z: Phase, ends: tuple[Float, Float] | None = None) -> dict[str, Float]:
+        """The quantities at times (k,) and states with a first axis k.
+
+        ends : the parts of K r'' and of its derivative along r' at the two ends, over |r'|, (k, 2), if they are known.
+        """
         rod, want, here, field = self._rod, self._want, self._here, self._field
         q = z.hi + z.lo
         omega = rod.omega(z)
@@ -107,8 +111,11 @@ class Ground:
             return found
         i, sign = [0, -1], np.array([-1.0, 1.0])
         e, e1 = (radius * e)[:, i], (radius * e1)[:, i]
-        couple = across(sign * moment[:, i], e, np.zeros(2))
-        rest = sign * contact[:, i] - self._end_loads.force(t, r[:, i])
+        bent, shear = moment[:, i], contact[:, i]
+        if ends is not None:
+            bent, shear = ends[0] * slope[:, i], -ends[1] * slope[:, i]
+        couple = across(sign * bent, e, np.zeros(2))
+        rest = sign * shear - self._end_loads.force(t, r[:, i])
         turn = reaction + self._end_loads.torque(t, rate[:, i]) - sign * torsion[:, i] - _dot(couple, e1)
         found["end_force"] = _split(across(rest, e, turn)).swapaxes(1, 2)
         found["end_couple"] = _split(couple).swapaxes(1, 2)

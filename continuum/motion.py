@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from continuum.density import Density
+from continuum.end_identities import EndIdentities, hold
 from continuum.functions import unresolved
 from continuum.galerkin import SpectralRod
 from continuum.ground import Ground
@@ -68,14 +69,15 @@ class Runner:
 
     def run(self, n: int, tolerance: float) -> Motion:
         rod = SpectralRod(self._scene, n, self._density)
-        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._compiled)
+        watch = EndIdentities(rod) if "contact_force" in self._want and hold(self._scene) else None
+        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._compiled, watch)
         at, initial = rod.reader(self.s), self._scene.fields(self.s)
         begun = at(rod.start)
         states = list(steps.at(self.times))
         every = Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
         fields = at(every)
         if self._want:
-            fields |= self._wanted(rod, states)
+            fields |= self._wanted(rod, states, watch, steps.integrals)
         if steps.lengths:
             self._first = steps.lengths[0]
         start = distances(begun, initial)
@@ -89,10 +91,13 @@ class Runner:
             reaction = np.concatenate(steps.reaction) if rod.loads.held.size else None
         return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance, reaction)
 
-    def _wanted(self, rod: SpectralRod, states: list[Phase]) -> dict[str, Float]:
+    def _wanted(
+        self, rod: SpectralRod, states: list[Phase], watch: EndIdentities | None, integrals: list[Float]
+    ) -> dict[str, Float]:
         ground = Ground(rod, self.s, self._want)
         ends = np.cumsum([len(z.pi) for z in states])[:-1]
-        parts = [ground.at(*group) for group in zip(np.split(self.times, ends), states, strict=True)]
+        known = [None] * len(states) if watch is None else [watch.at(*group) for group in zip(states, integrals, strict=True)]
+        parts = [ground.at(*group) for group in zip(np.split(self.times, ends), states, known, strict=True)]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

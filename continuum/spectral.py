@@ -40,7 +40,7 @@ LOOSEST = 2e-4  # largest tolerance of a step
 FAR = 100.0  # times the tolerance: for larger errors shorter steps are not tried
 LEAST, MOST = 1 / 3, 0.8  # limits of p, the error of a finer motion over that of the coarser one
 RATE = 0.5  # least p of omega
-WANTED = 0.5  # p of wanted quantities: the estimate is within five of the error where their own p is from -1.5 to 0.9
+WANTED = 0.4  # p of wanted quantities: the estimate is within five of the error where their own p is from -2 to 0.88
 MORE_STEPS = 1.2  # ratio of the numbers of steps above which two motions differ by their errors of steps
 SAME = 0.05  # relative: the end of a motion is real if two motions agree on its time to this
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from continuum import collocation, driven_ends
+from continuum.end_identities import EndIdentities
 from continuum.galerkin import SpectralRod
 from continuum.modes import Modes, Pencil
 from discs import SimulationError
@@ -76,16 +77,25 @@ class Steps:
     tolerance, stages : of a step.
     first : length of the first step that is tried.
     compiled : whether to use `continuum.kernels` or the plain twin.
+    watch : has rates at the stages of steps, which are integrated.
 
     Attributes
     ----------
     lengths : lengths of the steps taken.
+    integrals : those of `watch` since the start at the states that `at` gave, in groups (k, count); without it none.
     balance, reaction : work and dissipation since the start at the states that `at` gave, and torques of motors, in groups (k, 2)
         and (k, motors); without loads none.
     """
 
     def __init__(
-        self, rod: SpectralRod, duration: float, tolerance: float, stages: int, first: float, compiled: bool = True
+        self,
+        rod: SpectralRod,
+        duration: float,
+        tolerance: float,
+        stages: int,
+        first: float,
+        compiled: bool = True,
+        watch: EndIdentities | None = None,
     ) -> None:
         self.rod, self._duration, self._tolerance, self._compiled = rod, duration, tolerance, compiled
         self._stages = stages
@@ -98,17 +108,22 @@ class Steps:
         self.lengths: list[float] = []
         self.balance: list[Float] = []
         self.reaction: list[Float] = []
+        self.integrals: list[Float] = []
+        self._watch = watch
         self._timing = rod.loads.timing if rod.loads else None
 
     def at(self, times: Float) -> Iterator[Phase]:
         """The states at times (F,), increasing, in groups: arrays have one more leading axis."""
         t, z, spent, loads = 0.0, self.rod.start, np.zeros(2), self.rod.loads
         torque = driven_ends.reaction(self.rod, t, z)[None] if loads else np.empty((1, 0))
+        watch, total, rates = self._watch, np.zeros(self._watch.count if self._watch else 0), np.empty(0)
         while times.size:
             if times[0] <= t:
                 if loads:
                     self.balance.append(spent[None])
                     self.reaction.append(torque)
+                if watch:
+                    self.integrals.append(total[None])
                 yield Phase(z.hi[None], z.lo[None], z.pi[None])
                 times = times[1:]
                 continue
@@ -116,6 +131,8 @@ class Steps:
             t, z, v, p = self._advance(t, z)
             inside = times[times < t]
             power = None
+            if watch:
+                rates = watch.rates(t - before, start, v)
             if loads:
                 power, torques = driven_ends.power(self.rod, before, t - before, start, v, p)
                 torque = collocation.between(torques, np.ones(1))
@@ -125,7 +142,11 @@ class Steps:
                     if power is not None:
                         self.balance.append(spent + collocation.spent(t - before, power, parts))
                         self.reaction.append(collocation.between(torques, parts))
+                    if watch:
+                        self.integrals.append(total + collocation.spent(t - before, rates, parts))
                     yield collocation.within(start, t - before, v, p, parts)
+            if watch:
+                total = total + collocation.spent(t - before, rates, np.ones(1))[0]
             if power is not None:
                 z, kick = driven_ends.hold(self.rod, t, z)
                 spent = spent + collocation.spent(t - before, power, np.ones(1))[0] + (kick, 0.0)
