@@ -142,10 +142,9 @@ def lost_balance(problem: Problem, method: str, run: Solution) -> str:
     """The warning if energy - work + dissipated of a run drifts by more than ENERGY_DRIFT_WARNING of the largest of them."""
     terms = np.stack([run.energy, run.work, run.dissipated])
     if (falls := float(np.diff(run.dissipated, prepend=0.0).min())) < -1e-6 * np.abs(terms).max():
-        return (
-            f"{method}: dampers only take energy, but between two frames they gave {-falls:.3g}: the run may not be trusted; "
-            'take a smaller dt, or "gauss6"'
-        )
+        way = "take a smaller dt" + ("" if _damped(method) else ', or "radau5"')
+        said = f"dampers only take energy, but between two frames they gave {-falls:.3g}: the run may not be trusted"
+        return f"{method}: {said}; {way}"
     off = np.abs(run.energy - problem.energy() - run.work + run.dissipated)
     worst = int(off.argmax())
     if off[worst] <= ENERGY_DRIFT_WARNING * np.abs(terms).max():

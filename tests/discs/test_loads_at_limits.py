@@ -35,6 +35,9 @@ def test_dampers_that_give_energy_are_told():
     energy = run.energy + (run.balance - balance)[:, 1]  # the balance stays exact
     said = doubted(problem, replace(run, balance=balance, energy=energy))
     assert "dampers only take energy, but between two frames they gave" in said
+    assert said.endswith('take a smaller dt, or "radau5"')  # Gauss methods ring as the midpoint rule does
+    damping = replace(run, balance=balance, energy=energy, stats=run.stats | {"method": "radau3"})
+    assert doubted(problem, damping).endswith("take a smaller dt")
 
 
 @pytest.mark.parametrize("at", [0.0, 0.05, 3.95, 4.0])
