@@ -7,6 +7,7 @@ from typing import Any
 
 from compare.hardcases.problems import (
     collapse,
+    decay,
     every_other,
     folding,
     loaded,
@@ -18,7 +19,7 @@ from compare.hardcases.problems import (
     twisted,
     waves,
 )
-from compare.hardcases.runs import CONSERVING, FIXED, GAUSS, OURS, PEERS, TAKE_LOADS, Expectation, Found, motion
+from compare.hardcases.runs import CONSERVING, FIXED, GAUSS, PEERS, RADAU, TAKE_LOADS, USUAL_METHODS, Expectation, Found, motion
 from discs import Problem
 from discs.loads import Damping, Motor, OnRod, Rest, Slope, Torque, signals
 
@@ -36,7 +37,7 @@ class Case:
     what: str
     expectation: Expectation
     run: Callable[[str, float], Found]
-    methods: tuple[str, ...] = (*OURS, *PEERS)
+    methods: tuple[str, ...] = (*USUAL_METHODS, *PEERS)
 
     @property
     def key(self) -> str:
@@ -136,7 +137,7 @@ def cases(quick: bool = False) -> list[Case]:
     # after 7/8 of a period a wrong frequency is visible; midpoint, h < t/100, is off by omega^3 h^2 t/12 < 1.4e-3 in phase
     run = partial(motion, partial(twisted, 33, radius=0.0, duration=7.8), exact=torsion_wave)
     words = "the line does not move, and the twist is the exact standing wave to 2e-3; energy to 1e-3"
-    still = Expectation("exact", words, energy=1e-3, error=2e-3, must=OURS)
+    still = Expectation("exact", words, energy=1e-3, error=2e-3, must=USUAL_METHODS)
     add("extreme parameters", "R = 0", "points that cannot roll: only a torsion wave is left", still, run)
 
     few = "few discs", "a chain needs at least one bend"
@@ -158,6 +159,12 @@ def cases(quick: bool = False) -> list[Case]:
         run = partial(motion, partial(loaded, n, *loads), compared=False)
         able = tuple(m for m in TAKE_LOADS if m != "rk4" or not any(isinstance(load, Motor) for load in loads))
         add("loads", f"{setting}, N = {n}", what, exactly(words, energy=1e-10), run, methods=able)
+
+    what = "discs at random rates with viscous torsion, whose modes decay at rates up to 1e4, far above one over the step"
+    words = "rates at the end within 1e-3 of the largest at the start by Radau methods; other methods ring, and warn"
+    damped = Expectation("bound", words, energy=0.05, error=1e-3, must=RADAU)
+    implicit = tuple(m for m in TAKE_LOADS if m != "rk4")
+    add("fast decay", "N = 33, h = 0.1", what, damped, partial(decay, 33, 100.0, 0.1), methods=implicit)
 
     run = partial(motion, partial(twisted, 65, duration=9.0, twist=1.0), note=folding)
     words = "the equations remain valid: energy to 1e-10 (real discs would touch, see discs.mechanics.contact)"

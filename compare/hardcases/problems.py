@@ -16,9 +16,9 @@ from continuum import breathing_ring, rolling_rod, untwisting_rod
 from continuum.dispersion import frequency, growth, symbols
 from continuum.exact import ring, standing_wave
 from continuum.scenes import SCENES
-from discs import Leapfrog, Problem, Solution, State
+from discs import Leapfrog, Problem, Solution, State, simulate
 from discs.arrays import Float
-from discs.loads import OnRod
+from discs.loads import Damping, OnRod
 from discs.running.time_loop import March
 from discs.simulation import lost_energy
 
@@ -52,6 +52,11 @@ def rough(n: int, duration: float) -> Problem:
     return replace(problem, initial=start)
 
 
+def restless(n: int, viscosity: float) -> Problem:
+    """`rough` with viscous torsion and rolling resistance."""
+    return replace(rough(n, 4.5), loads=(Damping(rolling=0.3, torsion=viscosity),))
+
+
 def turned(problem: Problem, angle: float, move: tuple[float, float]) -> Problem:
     """The same problem, turned and moved in the plane."""
     s, c, d = problem.initial, np.cos(angle), np.sin(angle)
@@ -78,6 +83,16 @@ def folding(problem: Problem, run: Solution) -> str:
 
 
 # Cases with a measurement of their own
+
+
+def decay(n: int, viscosity: float, dt: float, method: str, seconds: float) -> Found:
+    """Random rates under viscous torsion and resistance. The error is that of omega at the end, of the largest at the start."""
+    problem = posed(partial(restless, n, viscosity))
+    found, run = march(problem, method, dt, seconds)
+    if run is None:
+        return found
+    exact = simulate(problem, "gauss8", problem.duration / 4000, frames=1, progress=False)
+    return found._replace(error=float(np.abs(run.omega[-1] - exact.omega[-1]).max() / np.abs(problem.initial.omega).max()))
 
 
 def rounding(make: Callable[[], Problem], dt: float, method: str, seconds: float) -> Found:

@@ -21,9 +21,11 @@ from discs.simulation import ENERGY_DRIFT_WARNING
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")
-TAKE_LOADS = (*CONSERVING, *GAUSS, "rk4", "auto", "default")  # loads that do work
+RADAU = ("radau3", "radau5")  # they do not keep the energy, and are for dampers: run with loads only
+TAKE_LOADS = (*CONSERVING, *GAUSS, *RADAU, "rk4", "auto", "default")  # loads that do work
 FIXED = (*CONSERVING, *GAUSS, *EXPLICIT)  # methods with a fixed step: a tolerance hides waves and rounding
-OURS = (*FIXED, "auto", "default")
+USUAL_METHODS = (*FIXED, "auto", "default")
+OURS = (*USUAL_METHODS, *RADAU)
 PEERS = ("SciPy Radau", "SciPy BDF", "SciPy DOP853", "CVODE BDF-5")
 TOL, RTOL = 1e-4, 1e-6  # of "auto", and of the peers
 SEARCHED = {"auto": TOL, "default": USUAL}  # "default" is `simulate(problem)` with nothing set

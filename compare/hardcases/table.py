@@ -141,10 +141,11 @@ class Stability:
             "the bound, with a warning or unconverged steps. **LOST**: outside the bound, without a warning. stopped: an error "
             "with time and disc. refused: an error before the start. failed: a peer's error. cut off: predicted to exceed its "
             "time. †: some steps did not converge. ·: not run, as the case does not apply: a tolerance hides waves and rounding, "
-            "and the parasitic mode belongs to the two-step scheme. Bold: a method of ours that did not meet the expectation. "
-            f"auto runs to {TOL:g}, default is `simulate(problem)` with nothing set, to {USUAL:g}; peers run to rtol {RTOL:g}; the "
-            "energy of peers is that at the end, and their variables satisfy rolling exactly. error: as the case defines it; off: "
-            "of positions and angles at the end, relative to the largest of each in the motion. Seconds are processor time."
+            "the parasitic mode belongs to the two-step scheme, and Radau methods, which do not keep the energy, are for dampers. "
+            f"Bold: a method of ours that did not meet the expectation. auto runs to {TOL:g}, default is `simulate(problem)` with "
+            f"nothing set, to {USUAL:g}; peers run to rtol {RTOL:g}; the energy of peers is that at the end, and their variables "
+            "satisfy rolling exactly. error: as the case defines it; off: of positions and angles at the end, relative to the "
+            "largest of each in the motion. Seconds are processor time."
         )
 
     def report(self) -> str:

@@ -15,7 +15,7 @@ from compare.__main__ import main
 from compare.hardcases import table as stability_table
 from compare.hardcases.cases import cases
 from compare.hardcases.problems import rolling_waves
-from compare.hardcases.runs import CONSERVING, EXPLICIT, FIXED, GAUSS, OURS, PEERS, Expectation, Found
+from compare.hardcases.runs import CONSERVING, EXPLICIT, FIXED, GAUSS, OURS, PEERS, RADAU, USUAL_METHODS, Expectation, Found
 from compare.hardcases.table import Row, Stability
 from compare.sweeps import read
 from continuum import untwisting_rod
@@ -36,12 +36,12 @@ SLOW = {("rounding", "N = 1025", method) for method in ("leapfrog", "mclachlan-p
 def table():
     """Every case by every method of ours."""
     with ThreadPoolExecutor(1) as here:
-        return stability(True, methods=TABLED, seconds=4.0, executor=here, progress=False)
+        return stability(True, methods=(*TABLED, *RADAU), seconds=4.0, executor=here, progress=False)
 
 
 def test_ours_do_as_expected_but_for_what_is_known(table):
     assert {(row.case, row.method) for row in table.failures} == FAILS
-    assert len(table.rows) == sum(method in case.methods for case in SMALL for method in TABLED)
+    assert len(table.rows) == sum(method in case.methods for case in SMALL for method in (*TABLED, *RADAU))
     assert {(row.case, row.setting, row.method) for row in table.rows if not row.expected} <= SLOW
 
 
@@ -128,6 +128,16 @@ def test_points_turn_as_the_exact_wave_by_every_method(table):
     found = {row.method: row.found for row in table.rows if row.setting == "R = 0"}
     assert set(found) == set(TABLED)
     assert all(found[method].error < 1e-6 for method in ("suzuki4", "kahanli6", "gauss4", "gauss6", "gauss8", "rk4", "auto"))
+
+
+def test_radau_methods_do_not_ring(table):
+    """After 45 steps modes that decay in far less than one have half of their rates by the midpoint rule, none by Radau methods."""
+    rates = {row.method: row.found.error for row in table.rows if row.case == "fast decay"}
+    assert rates["midpoint"] > 0.3
+    assert rates["gauss6"] > 0.1
+    assert rates["radau3"] < 1e-4
+    assert rates["radau5"] < 1e-5
+    assert {row.method for row in table.rows if row.case == "loads"} >= set(RADAU)
 
 
 def test_rounding(table):
@@ -219,7 +229,7 @@ def test_table_has_every_case_and_method():
     assert len(set(keys)) == len(keys)
     assert {case.name for case in cases()} == {case.name for case in SMALL}
     assert all(case.what and case.expectation.words for case in SMALL)
-    everywhere = [case for case in SMALL if case.methods == (*OURS, *PEERS)]
+    everywhere = [case for case in SMALL if case.methods == (*USUAL_METHODS, *PEERS)]
     assert len(everywhere) > 12
     assert simulate(lump(untwisting_rod(duration=0.1), 9), "midpoint", progress=False).stats["method"] in OURS
 
