@@ -2,8 +2,6 @@
 
 import argparse
 import sys
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from compare import load_limits, precision, report
@@ -18,15 +16,10 @@ from compare.results import WorkPrecision
 from compare.sweeps import read
 from compare.trust import gathered, trust
 from compare.trust_table import Trust
-from continuum import Scene, steered_rod, untwisting_rod
+from continuum import untwisting_rod
 from continuum.files import read_scene
 from discs import command_line
 from discs.chains.rolling import ROLLING
-
-LAWS: dict[str, Callable[[], Scene]] = {
-    **{law: partial(untwisting_rod, law) for law in ROLLING},
-    "own": lambda: steered_rod(stretch_stiffness=10, shear_stiffness=10, heading_inertia=0.25),
-}
 
 
 def about(what: object) -> str:
@@ -156,12 +149,17 @@ def add_precision(p: argparse.ArgumentParser) -> None:
         "--n", metavar="N", type=int, nargs="+", default=list(precision.SIZES), help="numbers of discs (default: 32 ... 2048)"
     )
     p.add_argument(
-        "--laws", metavar="LAW", nargs="+", choices=LAWS, default=list(LAWS), help=f"of {', '.join(LAWS)} (default: all)"
+        "--scenes",
+        metavar="SCENE",
+        nargs="+",
+        choices=precision.SCENES,
+        default=list(precision.UNLOADED),
+        help=f"of {', '.join(precision.SCENES)}, the last two with loads (default: those without)",
     )
     p.add_argument(
         "--repeats", metavar="M", type=int, default=5, help="rounds that time each setting; long runs have two times (default: 5)"
     )
-    p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest time for one run, s (default: 10)")
+    p.add_argument("--seconds", metavar="S", type=float, default=10.0, help="longest processor time for one run, s (default: 10)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_precision)
 
@@ -207,7 +205,7 @@ def run_precision(options: argparse.Namespace) -> None:
     """Measure speed against error and write table and picture; an interrupted run writes its results to precision-partial.*."""
     found, name, stopped = WorkPrecision([], {}, {}), "precision", False
     with fresh_files(options.out) as folder:
-        scenes = {law: LAWS[law]() for law in options.laws}
+        scenes = {name: precision.SCENES[name]() for name in options.scenes}
         try:
             precision.work_precision(
                 scenes, tuple(options.n), None, options.repeats, options.seconds, not options.quiet, into=found

@@ -6,9 +6,10 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from compare.peers import multipliers, reduced
+from compare.peers import loads, multipliers, reduced
 from compare.peers.peer import Outcome, Peer
-from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, Solution, Suzuki4, simulate
+from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, Radau3, Radau5, Solution, Suzuki4, simulate
+from discs.loads import Linear
 
 
 def ours(problem: Problem) -> list[Peer]:
@@ -35,14 +36,16 @@ def ours(problem: Problem) -> list[Peer]:
         fixed("gauss4", many[:11], lambda m: Gauss4(tolerance=max(0.01 / m**3, 1e-13))),
         fixed("gauss6", many[:15], lambda m: Gauss6(tolerance=max(0.003 / m**3, 1e-13))),
         fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(3e-4 / m**3, 1e-13))),
+        fixed("radau3", many[2:13:2], lambda m: Radau3(tolerance=max(0.01 / m**3, 1e-13))),
+        fixed("radau5", many[:13:2], lambda m: Radau5(tolerance=max(0.003 / m**3, 1e-13))),
         Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all attempts count; the setting is tol"),
     ]
 
 
 def _outcome(problem: Problem, run: Callable[[], Solution]) -> Outcome:
-    begun = clock.perf_counter()
+    begun = clock.process_time()
     found = run()
-    spent = clock.perf_counter() - begun
+    spent = clock.process_time() - begun
     if found.stats["unconverged"]:
         raise ArithmeticError(f"{found.stats['unconverged']} steps did not converge")
     q = np.array([getattr(found, row)[-1] for row in problem.system.rows])
@@ -52,11 +55,14 @@ def _outcome(problem: Problem, run: Callable[[], Solution]) -> Outcome:
 def peers(problem: Problem) -> list[Peer]:
     """The peers that are installed and can express the problem, at sizes they can handle.
 
-    Chains with true curvature run with peers that take the right-hand side or the saddle point from us: SciPy, CVODE, the saddle
-    point.
+    Chains with true curvature, and loads that are not forces, springs and dampers on discs and links, run with peers that take the
+    right-hand side or the saddle point from us: SciPy, CVODE, the saddle point. Exudyn takes loads on slaved headings, MuJoCo none.
+
+    Raises
+    ------
+    ValueError : for motors and, where equations are compiled, signals that are not those of `discs.loads.signals`.
     """
-    if problem.loads:
-        raise ValueError("peers take a problem without loads; got some: take replace(problem, loads=())")
+    loads.check(problem)
     f = reduced.Bound(problem)
     n, slaved = problem.chain.n, isinstance(problem.chain, Chain)
     law, curvature = (problem.chain.rolling, problem.chain.curvature) if isinstance(problem.chain, Chain) else ("own", "linear")
@@ -65,7 +71,9 @@ def peers(problem: Problem) -> list[Peer]:
         found += reduced.sundials_peers(problem, f)
     if n <= 128:
         found.append(multipliers.saddle_peer(problem))
-    if problem.system.parameters is None or curvature != "linear" or problem.chain.degree != 1:
+    load = problem.system.load
+    bent = isinstance(load, Linear) and load.bends is not None
+    if problem.system.parameters is None or curvature != "linear" or problem.chain.degree != 1 or bent:
         return found
     if find_spec("sksundae"):
         found.append(multipliers.multiplier_peer(problem))
@@ -73,12 +81,12 @@ def peers(problem: Problem) -> list[Peer]:
         from compare.peers.in_jax import diffrax_peers
 
         found += diffrax_peers(problem)
-    if find_spec("exudyn"):
+    if find_spec("exudyn") and (slaved or load is None):
         from compare.peers.exudyn_chain import exudyn_steered_peer
         from compare.peers.exudyn_field import exudyn_field_peer
 
         found.append(exudyn_field_peer(problem) if slaved else exudyn_steered_peer(problem))
-    if find_spec("mujoco") and n <= 512 and law in ("unit", "own"):
+    if find_spec("mujoco") and load is None and n <= 512 and law in ("unit", "own"):
         from compare.peers.mujoco_discs import mujoco_peer
 
         found += [mujoco_peer(problem), mujoco_peer(problem, second_order=False)]

@@ -27,7 +27,7 @@ KIND = {
     "own": "own headings",
     "elements": "elements of three",
 }
-LAW = {"field": "field law", "unit": "unit law", "own": "own headings"}
+LAW = {"field": "field law", "unit": "unit law", "own": "own headings", "tilted": "tilted rod", "driven": "driven rod"}
 SYMBOL = {"x": "x", "y": "y", "theta": "θ", "phi": "φ"}
 
 
@@ -178,6 +178,7 @@ def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
 
 
 OURS = {"midpoint": BLUE, "suzuki4": ORANGE, "gauss4": "#56B4E9", "gauss6": GREEN, "gauss8": PURPLE, "auto": "black"}
+OURS |= {"radau3": "#F0E442", "radau5": "#A0522D"}
 
 
 def precision(study: WorkPrecision) -> list[Axes]:
@@ -207,7 +208,7 @@ def precision(study: WorkPrecision) -> list[Axes]:
         ax.set_title(f"{LAW.get(name, name)}, N = {n}", fontsize="medium")
         ax.grid(alpha=0.3)
     for ax in grid[-1]:
-        ax.set_xlabel("wall time (s)")
+        ax.set_xlabel("processor time (s)")
     for ax in grid[:, 0]:
         ax.set_ylabel("relative error of x, y, θ")
     order = [m for m in (*OURS, *peers) if m in shown]

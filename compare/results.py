@@ -100,8 +100,8 @@ class Row(NamedTuple):
     """One method with one setting on one problem.
 
     error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
-    seconds : median of the rounds, or mean of a long run's two times. steps, gradients, solves : counts, None if a peer has
-    none. remark : why there is no result, or what is wrong with it.
+    seconds : processor time, median of the rounds, or mean of a long run's two times. steps, gradients, solves : counts, None if a
+    peer has none. remark : why there is no result, or what is wrong with it.
     """
 
     problem: str
@@ -190,7 +190,7 @@ class WorkPrecision:
                 f"Ours against the fastest peer at equal error. Reference: gauss8 with short steps, off by at most {floor:.1e}.",
                 self.speedups(),
                 *(f"* {name}: {how}." for name, how in self.differences.items()),
-                "All runs; errors relative to the largest value of each of x, y, θ (φ); times are medians, "
+                "All runs; errors relative to the largest value of each of x, y, θ (φ); times are processor time, medians, "
                 "of long runs means of two.",
                 self.table(),
             ]

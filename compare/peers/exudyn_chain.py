@@ -55,7 +55,7 @@ def exudyn_steered(problem: Problem, dt: float, frames: int = 2, spectral_radius
     apart = max(1, int(np.ceil(problem.duration / (frames - 1) / dt - 1e-9)))
     steps = apart * (frames - 1)
 
-    started = clock.perf_counter()
+    started = clock.process_time()
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     sensors = _build(mbs, chain, problem.initial)
@@ -65,7 +65,7 @@ def exudyn_steered(problem: Problem, dt: float, frames: int = 2, spectral_radius
     if not solver.SolveSystem(mbs, _settings(problem.duration, steps, frames, spectral_radius)):
         raise RuntimeError(f"Exudyn's solver failed at time {solver.it.currentTime:g}; take a smaller dt")
     records = np.array([[mbs.GetSensorStoredData(sensor) for sensor in pair] for pair in sensors])
-    seconds = clock.perf_counter() - started
+    seconds = clock.process_time() - started
 
     # (disc, value or rate, frame, time and coordinates) -> (coordinates, frame, disc)
     q, rate = records[:, 0, :, 1:].transpose(2, 1, 0), records[:, 1, :, 1:].transpose(2, 1, 0)

@@ -2,12 +2,13 @@ r"""The chain with slaved headings in Exudyn, with its multipliers: a peer of or
 
 The motion uses nothing of the reduced equations of `discs.chains.slaved`. Exudyn gets
 
-    M v. + K q = f + A(q)^T lambda,   A(q) v = 0,   q. = v,
+    M v. + D v + K q = f + A(q)^T lambda,   A(q) v = 0,   q. = v,
 
 with q = (x_i, y_i, theta_i) disc by disc:
 
-* M and K : an `ObjectGenericODE2` over all discs. M, diagonal, holds the discs' inertia, K is the constant Hessian of V; both are
-  sparse and compiled. f is not zero on a ring closed up to a shift only.
+* M, D and K : an `ObjectGenericODE2` over all discs. M, diagonal, holds the discs' inertia, K is the constant Hessian of V with the
+  springs of loads, D has their dampers; all are sparse and compiled. f, constant but for the signals of loads, which are a user
+  function in NumPy, is zero without loads unless a ring is closed up to a shift only.
 * A(q) : the rows x_i. - e_x,i theta_i. and y_i. - e_y,i theta_i., two for each disc. An `ObjectConnectorCoordinateVector` with
   velocityLevel=True takes the left side A(q) v and its derivative by v, which is A(q), from user functions. Its constant
   matrices are not enough: they multiply v and the squares of v, but not a position with a velocity.
@@ -66,10 +67,10 @@ def exudyn_field_peer(problem: Problem) -> Peer:
         # Any, as the stub of SolveSystem lacks self
         solver: Any = exu.MainSolverImplicitSecondOrder()
         settings = _settings(problem.duration, steps, rounding)
-        begun = clock.perf_counter()
-        mbs.SetPreStepUserFunction(lambda mbs, t: clock.perf_counter() - begun < seconds)
+        begun = clock.process_time()
+        mbs.SetPreStepUserFunction(lambda mbs, t: clock.process_time() - begun < seconds)
         success = solver.SolveSystem(mbs, settings)
-        spent = clock.perf_counter() - begun
+        spent = clock.process_time() - begun
         if spent > seconds:
             raise Cutoff
         if not success:
@@ -91,7 +92,23 @@ def _build(mbs: Any, problem: Problem) -> float:
     at_origin = system.shape(np.zeros_like(q0))  # not zero if the chain closes up to a shift
     along, roll = system._springs.hessians()
     by_disc = np.arange(3 * n).reshape(3, n).T.ravel()
-    stiffness = sp.csr_array(sp.block_diag([along, along, roll]))[by_disc][:, by_disc]
+
+    def ordered(matrix: Any) -> Any:
+        return sp.csr_array(matrix)[by_disc][:, by_disc]
+
+    load: Any = system.load
+    stiffness, push = sp.block_diag([along, along, roll]), -system.gradient(at_origin)
+    more: dict[str, Any] = {}
+    if load is not None:
+        stiffness, push = stiffness + sp.diags_array(load.stiffness.ravel()), push + load.constant
+        more["dampingMatrix"] = _container(ordered(_damping(load)))
+    if load is not None and load.drives:
+        more["forceUserFunction"] = lambda mbs, t, item, q, v: sum(
+            float(drive.signal(t)) * drive.pattern.T.ravel() for drive in load.drives
+        )
+        nothing = _container(sp.csr_array((3 * n, 3 * n)))  # derivatives by positions and velocities
+        more["jacobianUserFunction"] = lambda *_: nothing
+    stiffness = ordered(stiffness)
     # dense first: 33 MB at N = 2048
     slope = sp.csr_array(stencils.slopes(stencils.links(np.eye(n), chain.ends), chain.k, chain.ends).T)
     offset = system.slope(at_origin)
@@ -113,7 +130,8 @@ def _build(mbs: Any, problem: Problem) -> float:
             nodeNumbers=nodes,
             massMatrix=_container(sp.diags_array(system.weights.T.ravel())),
             stiffnessMatrix=_container(stiffness),
-            forceVector=-system.gradient(at_origin).T.ravel(),
+            forceVector=push.T.ravel(),
+            **more,
         )
     )
     ground = mbs.AddMarker(items.MarkerNodeCoordinates(nodeNumber=mbs.AddNode(items.NodePointGround())))
@@ -133,6 +151,15 @@ def _build(mbs: Any, problem: Problem) -> float:
         )
     mbs.Assemble()
     return float(4 * np.finfo(float).eps * abs(stiffness).sum(axis=1).max() * abs(q0).max())
+
+
+def _damping(load: Any) -> Any:
+    """The matrix of dampers, rows x, y, theta one after the other."""
+    matrix, n = sp.diags_array(load.damping.ravel()).tolil(), load.damping.shape[1]
+    for j in range(1, n + 1 if load.viscosity is not None else 0):  # the link before disc j
+        at = 2 * n + np.array([j - 1, j % n])
+        matrix[np.ix_(at, at)] += load.viscosity[0, j] * np.array([[1, -1], [-1, 1]])
+    return matrix
 
 
 class _Rolling:

@@ -2,9 +2,11 @@
 
 import time as clock
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from compare.peers import loads
 from compare.peers.peer import TOLERANCES, Cutoff, Outcome, Peer
 from compare.peers.reduced import banded, read_only
 from discs import Problem
@@ -12,7 +14,7 @@ from discs.arrays import Float
 
 
 def multiplier_peer(problem: Problem) -> Peer:
-    """IDA on q. = v, M v. = -grad V + A^T lambda, A(q) v = 0, the multipliers among the unknowns: index 2, banded, plain doubles.
+    """IDA on q. = v, M v. = f - grad V + A^T lambda, A(q) v = 0, with the multipliers as unknowns: index 2, banded, plain doubles.
 
     For slaved and own headings alike: A v = r. - e theta., two rows for each disc.
     """
@@ -28,33 +30,34 @@ def multiplier_peer(problem: Problem) -> Peer:
 
     def residual(t: float, y: Float, yp: Float, out: Float) -> None:
         calls[0] += 1
-        if not calls[0] & 63 and clock.perf_counter() > until[0]:
+        if not calls[0] & 63 and clock.process_time() > until[0]:
             raise Cutoff
-        compiled(y, yp, out)
+        compiled(t, y, yp, out)
 
     calls, until = [0], [np.inf]
-    force = system.contact_force(shape, v0)
-    acceleration = -system.gradient(shape)
+    push = 0.0 if system.load is None else system.load.force(0.0, z.hi, v0)
+    force = system.contact_force(shape, v0, push)
+    acceleration = push - system.gradient(shape)
     acceleration[:2] += force
     e = system.contact(shape)
     acceleration[2] -= (e * force).sum(axis=0)
     acceleration /= system.weights
     y0 = np.concatenate([z.hi, v0, force]).T.ravel()
     yp0 = np.concatenate([v0, acceleration, np.zeros_like(force)]).T.ravel()
-    compiled(read_only(y0), read_only(yp0), np.empty_like(y0))
+    compiled(0.0, read_only(y0), read_only(yp0), np.empty_like(y0))
     algebraic = np.arange(n * width).reshape(n, width)[:, 2 * rows :].ravel()
     allowed = np.ones((n, width))
     allowed[:, 2 * rows :] = 1e6  # multipliers of an index-2 system are not controlled
     options = banded(problem, (system.reach + 1) * width - 1)
 
     def run(rtol: float, seconds: float) -> Outcome:
-        calls[0], until[0] = 0, clock.perf_counter() + seconds
-        begun = clock.perf_counter()
+        calls[0], until[0] = 0, clock.process_time() + seconds
+        begun = clock.process_time()
         solver = IDA(
             residual, rtol=rtol, atol=0.01 * rtol * allowed.ravel(), algebraic_idx=algebraic, max_num_steps=10**8, **options
         )
         found = solver.solve(np.array([0.0, problem.duration]), y0, yp0)
-        spent = clock.perf_counter() - begun
+        spent = clock.process_time() - begun
         if spent > seconds:
             raise Cutoff
         if not found.success:
@@ -64,25 +67,29 @@ def multiplier_peer(problem: Problem) -> Peer:
     return Peer("IDA, multipliers", TOLERANCES[:7], run, "index 2; errors of the multipliers are not controlled")
 
 
-def _residual(problem: Problem) -> Callable[[Float, Float, Float], None]:
-    """The residual of the multiplier form, (y, y., out), compiled for one chain."""
+def _residual(problem: Problem) -> Callable[[float, Float, Float, Float], None]:
+    """The residual of the multiplier form, (t, y, y., out), compiled for one chain and its loads."""
     from discs.kernels import protocol as do
     from discs.kernels.compiled import jit
 
     system, chain = problem.system, problem.system.parameters
     rows, n = len(system.rows), system.n
     weights, width = np.array(system.weights), 2 * len(system.rows) + 2
+    load: Any = system.load
+    push = loads.pull(load, jit)
 
     @jit
-    def residual(y, yp, out):  # type: ignore[no-untyped-def]
+    def residual(t, y, yp, out):  # type: ignore[no-untyped-def]
         work = do.workspace(chain)
         q, still, g, c = np.empty((rows, n)), np.zeros((rows, n)), np.empty((rows, n)), np.empty((rows, n))
+        v = np.empty((rows, n))
         for i in range(n):
             for row in range(rows):
-                q[row, i] = y[width * i + row]
+                q[row, i], v[row, i] = y[width * i + row], y[width * i + rows + row]
         do.settle(chain, work, q, still)
         do.basis(chain, work, still, c)
         do.gradient(chain, work, still, g)
+        push(t, q, v, g)
         for i in range(n):
             at = width * i
             ex, ey = c[0, i] / c[2, i], c[1, i] / c[2, i]
@@ -114,7 +121,7 @@ def saddle_peer(problem: Problem) -> Peer:
 
     def f(t: float, y: Float) -> Float:
         calls[0] += 1
-        if clock.perf_counter() > until[0]:
+        if clock.process_time() > until[0]:
             raise Cutoff
         q, v = y[:size].reshape(rows, n), y[size:].reshape(rows, n)
         shape = system.shape(q)
@@ -126,15 +133,16 @@ def saddle_peer(problem: Problem) -> Peer:
             matrix[row, side * n + disc] = 1.0
             matrix[row, 2 * n + disc] = -e[side]
         matrix[:size, size:] = matrix[size:, :size].T
-        right = np.concatenate([-system.gradient(shape).ravel(), (turning * v[2]).ravel()])
+        push = 0.0 if system.load is None else system.load.force(t, q, v)
+        right = np.concatenate([(push - system.gradient(shape)).ravel(), (turning * v[2]).ravel()])
         return np.concatenate([y[size:], np.linalg.solve(matrix, right)[:size]])
 
     def run(rtol: float, seconds: float) -> Outcome:
-        calls[0], until[0] = 0, clock.perf_counter() + seconds
-        begun = clock.perf_counter()
+        calls[0], until[0] = 0, clock.process_time() + seconds
+        begun = clock.process_time()
         y0 = np.concatenate([z.hi.ravel(), v0.ravel()])
         found = solve_ivp(f, (0.0, problem.duration), y0, "DOP853", t_eval=(problem.duration,), rtol=rtol, atol=rtol)
-        spent = clock.perf_counter() - begun
+        spent = clock.process_time() - begun
         if not found.success:
             raise ArithmeticError(found.message)
         return Outcome(found.y[:size, -1].reshape(rows, n), found.nfev // 12, calls[0], calls[0], spent)

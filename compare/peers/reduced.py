@@ -1,7 +1,7 @@
 """Peers that take a right-hand side, the reduced equations: SciPy and SUNDIALS.
 
-All get the same compiled function, y. = f(t, y) with y = (x, y, theta, pi, ...) disc by disc, bound to its chain so that a call
-has little overhead. Chains without a compiled form (true curvature) get the plain one, as our own methods do.
+All get the same compiled function, y. = f(t, y) with y = (x, y, theta, pi, ...) disc by disc, bound to its chain and its loads so
+that a call has little overhead. Chains without a compiled form (true curvature) get the plain one, as our own methods do.
 """
 
 import time as clock
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from compare.peers import loads
 from compare.peers.peer import TOLERANCES, Cutoff, Outcome, Peer
 from discs import Problem
 from discs.arrays import Float
@@ -32,10 +33,18 @@ def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
     from discs.kernels.compiled import jit
 
     chain, inner = problem.system.parameters, jit(driver.reduced.__wrapped__)  # type: ignore[attr-defined]
+    if chain.load.patterns.size:
+        at = loads.timed(problem, jit)
 
-    @jit
-    def f(t, y, out):  # type: ignore[no-untyped-def]
-        inner(chain, t, y, out)
+        @jit
+        def f(t, y, out):  # type: ignore[no-untyped-def]
+            inner(at(t), t, y, out)
+
+    else:
+
+        @jit
+        def f(t, y, out):  # type: ignore[no-untyped-def]
+            inner(chain, t, y, out)
 
     f(0.0, read_only(y), np.empty_like(y))
     f.disable_compile()  # type: ignore[attr-defined]
@@ -71,7 +80,7 @@ class Bound:
 
     def start(self, seconds: float) -> None:
         """Start counting."""
-        self.calls, self.until = 0, clock.perf_counter() + seconds
+        self.calls, self.until = 0, clock.process_time() + seconds
 
     def fill(self, t: float, y: Float, out: Float) -> None:
         """SUNDIALS' form. A failed callback is reported by the solver, not raised: NaN makes it stop."""
@@ -82,7 +91,7 @@ class Bound:
 
     def watch(self, t: float) -> None:
         """Stop a run whose time is up; t is the time it has reached."""
-        if clock.perf_counter() > self.until:
+        if clock.process_time() > self.until:
             raise Cutoff
 
     def __call__(self, t: float, y: Float) -> Float:
@@ -103,11 +112,11 @@ def scipy_peers(problem: Problem, f: Bound) -> list[Peer]:
     def runner(name: str, options: dict[str, Any]) -> Callable[[float, float], Outcome]:
         def run(rtol: float, seconds: float) -> Outcome:
             f.start(seconds)
-            begun = clock.perf_counter()
+            begun = clock.process_time()
             span = (0.0, problem.duration)
             with np.errstate(invalid="ignore", over="ignore"):  # BDF also computes with rows of a table that it has not filled yet
                 found = solve_ivp(f, span, f.y0, name, t_eval=span[1:], rtol=rtol, atol=0.01 * rtol * f.unit, **options)
-            spent = clock.perf_counter() - begun
+            spent = clock.process_time() - begun
             if not found.success:
                 raise ArithmeticError(found.message)
             steps = max(1, round(found.nfev / {"RK45": 6, "DOP853": 12}.get(name, 1))) if name in ("RK45", "DOP853") else 0
@@ -133,10 +142,10 @@ def sundials_peers(problem: Problem, f: Bound) -> list[Peer]:
     def runner(**options: Any) -> Callable[[float, float], Outcome]:
         def run(rtol: float, seconds: float) -> Outcome:
             f.start(seconds)
-            begun = clock.perf_counter()
+            begun = clock.process_time()
             solver = CVODE(f.fill, rtol=rtol, atol=0.01 * rtol * f.unit, max_num_steps=10**8, **options, **band)
             found = solver.solve(np.array([0.0, problem.duration]), f.y0)
-            spent = clock.perf_counter() - begun
+            spent = clock.process_time() - begun
             if spent > seconds:
                 raise Cutoff
             if not found.success:

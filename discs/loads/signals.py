@@ -22,12 +22,17 @@ class Named:
     breaks : times at which it, or a derivative of it, jumps.
     """
 
+    def formula(self, xp: Any = np) -> Callable[[Any], Any]:
+        """It as a function of t, in functions of NumPy or of another module `xp` that has them; numba compiles it."""
+        raise NotImplementedError
+
     @property
     def breaks(self) -> tuple[float, ...]:
         return ()
 
     def __call__(self, t: ArrayLike) -> Float:
-        raise NotImplementedError
+        found: Float = np.asarray(self.formula()(np.asarray(t, dtype=float)))
+        return found
 
 
 def _settle(signal: Named, *names: str) -> None:
@@ -46,9 +51,9 @@ class sine(Named):
     def __post_init__(self) -> None:
         _settle(self, "amplitude", "rate", "phase")
 
-    def __call__(self, t: ArrayLike) -> Float:
-        found: Float = self.amplitude * np.sin(self.rate * np.asarray(t) + self.phase)
-        return found
+    def formula(self, xp: Any = np) -> Callable[[Any], Any]:
+        amplitude, rate, phase = self.amplitude, self.rate, self.phase
+        return lambda t: amplitude * xp.sin(rate * t + phase)
 
 
 @dataclass(frozen=True)
@@ -67,19 +72,23 @@ class ramp(Named):
     def breaks(self) -> tuple[float, ...]:
         return self.t0, self.t1
 
-    def __call__(self, t: ArrayLike) -> Float:
-        found: Float = np.clip((np.asarray(t) - self.t0) / (self.t1 - self.t0), 0.0, 1.0)
-        return found
+    def formula(self, xp: Any = np) -> Callable[[Any], Any]:
+        t0, t1 = self.t0, self.t1
+        return lambda t: xp.minimum(xp.maximum((t - t0) / (t1 - t0), 0.0), 1.0)
 
 
 @dataclass(frozen=True)
 class smooth(ramp):
     """0 until t0, 1 from t1 on, four continuous derivatives: x^5 (126 - 420 x + 540 x^2 - 315 x^3 + 70 x^4) of the ramp x."""
 
-    def __call__(self, t: ArrayLike) -> Float:
-        x = super().__call__(t)
-        found: Float = x**5 * (126 + x * (-420 + x * (540 + x * (-315 + 70 * x))))
-        return found
+    def formula(self, xp: Any = np) -> Callable[[Any], Any]:
+        t0, t1 = self.t0, self.t1
+
+        def value(t: Any) -> Any:
+            x = xp.minimum(xp.maximum((t - t0) / (t1 - t0), 0.0), 1.0)
+            return x**5 * (126 + x * (-420 + x * (540 + x * (-315 + 70 * x))))
+
+        return value
 
 
 @dataclass(frozen=True)
@@ -101,10 +110,9 @@ class pulse(Named):
     def breaks(self) -> tuple[float, ...]:
         return self.t0, self.t0 + self.width
 
-    def __call__(self, t: ArrayLike) -> Float:
-        since = np.asarray(t) - self.t0
-        found: Float = ((since >= 0) & (since < self.width)).astype(float)
-        return found
+    def formula(self, xp: Any = np) -> Callable[[Any], Any]:
+        t0, width = self.t0, self.width
+        return lambda t: 1.0 * ((t - t0 >= 0) & (t - t0 < width))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,17 +139,17 @@ class table(Named):
     def breaks(self) -> tuple[float, ...]:
         return tuple(np.asarray(self.t).tolist())
 
-    def __call__(self, t: ArrayLike) -> Float:
-        found: Float = np.interp(t, self.t, self.values)  # type: ignore[arg-type]  # arrays by now
-        return found
+    def formula(self, xp: Any = np) -> Callable[[Any], Any]:
+        times, values = self.t, self.values
+        return lambda t: xp.interp(t, times, values)
 
 
 @dataclass(frozen=True)
 class steady(Named):
     """1."""
 
-    def __call__(self, t: ArrayLike) -> Float:
-        return np.ones(np.shape(t))
+    def formula(self, xp: Any = np) -> Callable[[Any], Any]:
+        return lambda t: 0.0 * t + 1.0
 
 
 NAMES: dict[str, type[Named]] = {cls.__name__: cls for cls in (sine, ramp, pulse, smooth, table)}

@@ -1,5 +1,6 @@
 """Speed against error: every peer solves the same problem, failures stay in the table, and the arithmetic of the comparison."""
 
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -15,14 +16,23 @@ from compare.results import Row, WorkPrecision
 from continuum import untwisting_rod
 from discs import Problem
 from discs.kernels import driver
+from discs.loads import Damping, Force, Rest, Slope, Spring, Torque, signals
 from tests.conftest import Model, uneven
 
 pytestmark = pytest.mark.slow
 
+LOADS = (
+    Slope(0.2, -0.4),
+    Spring(1.0, 0.5, 0.8, at=3.0),
+    Damping(rolling=0.3, torsion=lambda s: 0.1 * (1 + s)),
+    Torque(lambda s: 0.3 - 0.1 * s, signals.smooth(0.1, 0.8)),
+    Force(y=0.7, signal=signals.sine(1.1, 4.0, 0.4), at=0.0),
+    Rest(twist=0.6, signal=signals.table([0.2, 0.9], [0.3, 1.0])),
+)
 # a short motion: peers whose error is that of their tolerances come close
 SHORT = {
     "unit": lump(untwisting_rod(rolling="unit", duration=0.4), 9),
-    "uneven": uneven(7, Model("springs", "field")),
+    "uneven": replace(uneven(7, Model("springs", "field")), loads=LOADS),
     "uneven own": uneven(7, Model("springs", "steered")),
     "uneven true": uneven(7, Model("springs", "true")),
 }
@@ -139,7 +149,7 @@ def test_a_run_over_its_time_is_cut_off():
 def test_command_line(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("compare.precision.peers", scipy_alone)  # the others: see above
     out = tmp_path / "out"
-    arguments = ["precision", "--n", "9", "--laws", "field", "--repeats", "1", "--seconds", "0.5", "--quiet", "--out", str(out)]
+    arguments = ["precision", "--n", "9", "--scenes", "field", "--repeats", "1", "--seconds", "0.5", "--quiet", "--out", str(out)]
     assert main(arguments) == 0
     assert sorted(p.name for p in out.iterdir()) == ["precision.csv", "precision.md", "precision.png"]
     printed = capsys.readouterr().out
@@ -151,7 +161,7 @@ def test_command_line(tmp_path, capsys, monkeypatch):
 
 
 def test_an_interrupted_run_leaves_what_it_has_finished(tmp_path, capsys, monkeypatch):
-    out, arguments = tmp_path / "out", ["precision", "--laws", "field", "--repeats", "1", "--seconds", "0.5", "--quiet"]
+    out, arguments = tmp_path / "out", ["precision", "--scenes", "field", "--repeats", "1", "--seconds", "0.5", "--quiet"]
 
     def interrupted(problem: Problem) -> list[Peer]:
         if problem.chain.n == 9:
