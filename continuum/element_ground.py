@@ -20,6 +20,7 @@ from continuum.element_loads import INSIDE, SteeredTerms, put
 from continuum.elements import Elements
 from continuum.ground import across
 from continuum.load_terms import spread_and_points
+from continuum.wants import smooth_tests
 from discs.arrays import Float
 
 
@@ -38,6 +39,7 @@ class ElementGround:
         spread, points = spread_and_points(scene)
         inward = np.zeros(places.shape[1])
         inward[[0, -1]] = INSIDE * scene.rod.length, -INSIDE * scene.rod.length
+        self._tests = smooth_tests(places.ravel(), scene.rod.length, scene.closed).reshape(3, -1, *places.shape)
         self._loads = SteeredTerms.along(scene, spread, (places + inward).ravel(), put)
         self._end_loads = SteeredTerms.along(scene, points, np.array([0.0, scene.rod.length]), put)
 
@@ -68,15 +70,20 @@ class ElementGround:
             torque = self._loads.torque(now, omega.reshape(1, -1)).reshape(shape)
             spin = faster[grid.index]
             slope = grid.slope(np.stack([n.real, n.imag, stress[2]]))
-            rest = rod.density * (e * spin - rod.radius * along * turn * omega) - slope[0] - 1j * slope[1] - force
-            inner = across(rest, e, slope[2] + torque - rod.spin_inertia * spin)
+            free = rod.density * (e * spin - rod.radius * along * turn * omega) - force
+            eta, eta1 = (grid.w * values for values in self._tests[:2])
+            moments = (free * eta + n * eta1).sum(axis=(1, 2))
+            inner = across(free - slope[0] - 1j * slope[1], e, slope[2] + torque - rod.spin_inertia * spin)
             local |= {"force_x": inner.real, "force_y": inner.imag}
             if not elements.scene.closed:
                 ends, sign = ([0, -1], [0, -1]), np.array([-1.0, 1.0])
-                rest = sign * n[ends] - self._end_loads.force(now, (xy[0] + 1j * xy[1])[ends][None])[0]
+                pushed = self._end_loads.force(now, (xy[0] + 1j * xy[1])[ends][None])[0]
+                moments = moments - self._tests[0][:, *ends] @ pushed
+                rest = sign * n[ends] - pushed
                 moment = reaction + self._end_loads.torque(now, omega[ends][None])[0] - sign * stress[2][ends]
                 force = across(rest, e[ends], moment)
                 found |= {"end_force": np.stack([force.real, force.imag], axis=1), "end_couple": np.zeros((2, 2))}
+            found["contact_moments"] = np.stack([moments.real, moments.imag])
         sampled = dict(zip(local, grid.sample(np.stack(list(local.values())), self._s), strict=True)) if local else {}
         if "force_x" in sampled:
             found["contact_force"] = np.stack([sampled.pop("force_x"), sampled.pop("force_y")])

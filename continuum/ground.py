@@ -27,7 +27,7 @@ that of Galerkin's equations.
 
 **Numerics.** r. = E W with E = i h(r') and W = R omega, the polynomial through its values at the nodes, and r.. = E. W + E W. at
 each place. m, N and M are interpolated at the nodes and differentiated there, except for theta_0, whose derivatives are those of
-the initial fields.
+the initial fields. `contact_moments` are <lambda, eta> by the first line, without derivatives of m and N.
 """
 
 import numpy as np
@@ -35,6 +35,7 @@ import numpy as np
 from continuum.galerkin import SpectralRod
 from continuum.initial import resolve
 from continuum.load_terms import Terms, spread_and_points, viscosity
+from continuum.wants import smooth_tests
 from discs.arrays import Complex, Float
 from discs.skew import Phase
 
@@ -65,6 +66,7 @@ class Ground:
         self._viscosity = viscosity(scene.loads, nodes)
         initial = resolve(scene)
         self._twist, self._twist1 = initial.at("theta", s, 1), initial.at("theta", s, 2)
+        self._tests = smooth_tests(s, scene.rod.length, scene.closed)
         stiffness = self._nodes.torsion_stiffness
         self._stiffer = stiffness @ self._field[1] if stiffness.ndim else 0.0  # beta'
 
@@ -103,10 +105,14 @@ class Ground:
         spin, reaction = self._spins(t, z, omega)
         r = a @ self._line[0] + rod.shift * self._s
         faster = 1j * _vector(rod.law.rate(_pair(slope), _pair(turning))) * w + e * ((self._nodes.radius * spin) @ field[0])
-        rest = here.density * faster + m @ field[2] - n @ field[1] - self._loads.force(t, r)
+        free = here.density * faster - self._loads.force(t, r)
+        rest = free + m @ field[2] - n @ field[1]
         turn = torsion1 + self._loads.torque(t, rate) - here.spin_inertia * (spin @ field[0])
         radius = here.radius + 0 * self._s
         found["contact_force"] = _split(across(rest, radius * e, turn))
+        eta, eta1, eta2 = self._tests * weights(self._s, rod.closed)
+        moments = free @ eta.T + moment @ eta2.T + (n @ field[0]) @ eta1.T
+        found["contact_moments"] = _split(moments - self._end_loads.force(t, r[:, [0, -1]]) @ self._tests[0][:, [0, -1]].T)
         if rod.closed:
             return found
         i, sign = [0, -1], np.array([-1.0, 1.0])
@@ -164,6 +170,15 @@ class Ground:
             spin[:, held] = changes
             reaction[:, np.minimum(held, 1)] = (changes / c.t[:, held] - push[:, held]) / c.t[:, held]
         return spin, reaction
+
+
+def weights(s: Float, closed: bool) -> Float:
+    """Weights of a sum over equally spaced places (S,): the trapezoidal rule, at ends with Gregory's terms of order 4."""
+    found = np.full(s.size, s[1] - s[0])
+    if not closed:
+        end = found[0] * np.array([3 / 8, 7 / 6, 23 / 24])
+        found[:3], found[-3:] = end, end[::-1]
+    return found
 
 
 def across(rest: Complex, e: Complex, turn: Float) -> Complex:

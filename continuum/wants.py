@@ -2,14 +2,17 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from continuum.load_places import point_loads
 from continuum.rod import Scene
+from discs.arrays import Float
 from discs.running.frames import wanted
 
 ARRAYS = {
     "velocity": ("x_rate", "y_rate"),
     "slope": ("slope_x", "slope_y"),
-    "contact_force": ("contact_force", "end_force", "end_couple"),
+    "contact_force": ("contact_force", "contact_moments", "end_force", "end_couple"),
     "energy_density": ("energy_density",),
     "energy_flux": ("energy_flux",),
 }
@@ -44,3 +47,14 @@ def check_want(want: Iterable[str], method: str, scene: Scene) -> tuple[str, ...
 def arrays(want: tuple[str, ...], closed: bool) -> tuple[str, ...]:
     """The arrays of wanted quantities; a closed rod has no end forces."""
     return tuple(name for key in ARRAYS if key in want for name in ARRAYS[key] if not (closed and name.startswith("end_")))
+
+
+def smooth_tests(s: Float, length: float, closed: bool) -> Float:
+    """The test functions of contact_moments and their first two derivatives at places (S,), (3, 5, S).
+
+    cos(k pi s/length), k = 0 ... 4; on a closed rod 1, cos, sin, cos, sin of 2 pi s/length and of twice that. For discs the moments
+    are sums, `run.contact_force @ smooth_tests(chain.s, chain.length, closed)[0].T`.
+    """
+    q = np.pi / length * (2 * np.array([0, 1, 1, 2, 2]) if closed else np.arange(5))[:, None]
+    phase = np.array([0, 0, -np.pi / 2, 0, -np.pi / 2])[:, None] if closed else 0.0
+    return np.stack([q**m * np.cos(q * s + phase + m * np.pi / 2) for m in range(3)])

@@ -91,6 +91,8 @@ class Solution(Result):
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".
     contact_force : (F, 2, N), force (x, y) of the ground that keeps each disc rolling, the multiplier lambda, mass times length
         per time squared; want "contact_force". Of a field the force per length, without what acts at its ends.
+    contact_moments : (F, 2, 5), of a field, the ground's force against test functions, what acts at the ends included: the
+        integrals of lambda cos(k pi s/length), k = 0 ... 4; for a closed rod see `continuum.wants.smooth_tests`.
     end_force, end_couple : (F, 2, 2), [frame, end, component], force and couple of the ground at the two free ends of a field; the
         couple is the first moment of the force about the end. None of a closed rod; want "contact_force".
     energy_density, energy_flux : (F, N), of a field, energy per length and energy per time towards larger s; want these names.
@@ -121,6 +123,7 @@ class Solution(Result):
     slope_x: Float | None = None
     slope_y: Float | None = None
     contact_force: Float | None = None
+    contact_moments: Float | None = None
     end_force: Float | None = None
     end_couple: Float | None = None
     energy_density: Float | None = None

@@ -50,6 +50,9 @@ QUANTITIES = {
     ),
     "end_force": Quantity(("end", "axis"), "mass length per time squared", "force of the ground at the ends of a field"),
     "end_couple": Quantity(("end", "axis"), "mass length squared per time squared", "couple of the ground at the ends of a field"),
+    "contact_moments": Quantity(
+        ("axis", "moment"), "mass length per time squared", "force of the ground on a field against test functions"
+    ),
     "energy_density": Quantity(("disc",), "mass length per time squared", "energy per length of a field"),
     "energy_flux": Quantity(("disc",), "mass length squared per time cubed", "energy per time towards larger s, of a field"),
     "tension": Quantity(("link",), "mass length per time squared", "tension of the links"),

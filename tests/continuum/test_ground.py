@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from continuum import Rod, Scene, breathing_ring, exact, motion, rolling_rod, solve, untwisting_rod
+from compare import lump
+from continuum import Rod, Scene, breathing_ring, exact, motion, rolling_rod, solve, steered_rod, untwisting_rod
+from continuum.ground import weights
 from continuum.motion import Runner
-from continuum.wants import ARRAYS
-from discs import load
+from continuum.wants import ARRAYS, smooth_tests
+from discs import load, simulate
 from discs.loads import Force, Torque
 
 ROD = {"length": 3.7, "density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.7}
@@ -98,9 +100,7 @@ def test_the_ground_alone_changes_momentum(rolling):
     middle, step = 1.9, 2e-4
     scene = Scene(rod=Rod(**ROD), initial=lopsided, duration=2.0, rolling=rolling)
     found = field(scene, 1e-8, frames=middle + step * np.arange(-2, 3))
-    weights = np.full(found.s.size, found.s[1])
-    weights[[0, -1]] /= 2
-    weights[[0, 1, 2, -3, -2, -1]] += found.s[1] * np.array([-1 / 8, 1 / 6, -1 / 24, -1 / 24, 1 / 6, -1 / 8])  # Gregory
+    shares = weights(found.s, False)
 
     def rate(values):
         return np.tensordot([1 / 12, -2 / 3, 0, 2 / 3, -1 / 12], values, 1) / step
@@ -111,11 +111,36 @@ def test_the_ground_alone_changes_momentum(rolling):
     ends, couple = found.end_force[2], found.end_couple[2]
     assert np.abs(ends).max() > 0.1
     assert np.abs(couple).max() > 0.1
-    np.testing.assert_allclose(weights @ force + ends.sum(axis=0), rate(1.3 * np.einsum("s,fsi->fi", weights, v)), atol=2e-4)
-    turn = weights @ cross(r[2], force) + (cross(r[2, [0, -1]], ends) + cross(z, couple)).sum()
-    assert turn == pytest.approx(rate(1.3 * cross(r, v) @ weights), abs=5e-4)
-    np.testing.assert_allclose(found.energy_density @ weights, found.energy, atol=1e-6)
+    np.testing.assert_allclose(shares @ force + ends.sum(axis=0), rate(1.3 * np.einsum("s,fsi->fi", shares, v)), atol=2e-4)
+    turn = shares @ cross(r[2], force) + (cross(r[2, [0, -1]], ends) + cross(z, couple)).sum()
+    assert turn == pytest.approx(rate(1.3 * cross(r, v) @ shares), abs=5e-4)
+    np.testing.assert_allclose(found.energy_density @ shares, found.energy, atol=1e-6)
     np.testing.assert_allclose(found.energy_flux[:, [0, -1]], 0.0, atol=found.error_estimate["energy_flux"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["field", "unit", "own"])
+def test_forces_on_discs_tend_to_the_moments(law):
+    """Sums over discs, which know nothing of ends: at order two to int lambda eta + force . eta + couple . eta' of the field."""
+    scene = Scene(rod=Rod(**ROD), initial=lopsided, duration=1.0, rolling="field" if law == "own" else law)
+    scene = steered_rod(duration=1.0, **ROD) if law == "own" else scene
+    found = field(scene, 1e-6, frames=[1.0])
+    ends = {} if law == "own" else {"ends": "consistent"}
+    sums = []
+    for n in (33, 65, 129):
+        problem = lump(scene, n, **ends)
+        run = simulate(problem, "suzuki4", dt=1 / (4 * n), frames=[1.0], want="contact_force", progress=False)
+        eta = smooth_tests(problem.chain.s, scene.rod.length, scene.closed)[0]
+        sums.append(run.contact_force[0] @ eta.T)
+        inside = slice(n // 4, -(n // 4))
+        every = found.contact_force[0][:, :: (found.s.size - 1) // (n - 1)]
+        assert np.abs(run.contact_force[0] / problem.chain.w - every)[:, inside].max() < 100 / n**2
+    errors = [np.abs(each - found.contact_moments[0]).max() for each in sums]
+    assert errors[0] > 1e-3
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.3)
+    assert np.abs((4 * sums[2] - sums[1]) / 3 - found.contact_moments[0]).max() < errors[2] / 5
+    if law == "own":
+        assert not found.end_couple.any()
 
 
 def test_loads_at_the_ends():
