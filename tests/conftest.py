@@ -1,6 +1,7 @@
 """Chains and problems that the tests share: unequal, non-unit parameters, no symmetry."""
 
 import signal
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -8,15 +9,35 @@ import pytest
 
 from continuum import solve, untwisting_rod
 from discs import Chain, Problem, State, SteeredChain
+from discs.integrators import METHODS
 from discs.kernels import driver
+from discs.kernels.__main__ import sharing
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job: tests send Ctrl-C, to themselves and to children
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """The lessons first, which take long, as do the tests of `compare` that follow: so no worker waits for another at the end."""
+    """The lessons first, which take long, as do the tests of `compare` that follow: so no worker waits for another at the end.
+
+    Tests of compiled pairs of a chain and a method that the short suite does not compile are long.
+    """
     items.sort(key=lambda item: item.path.stem != "test_notebooks")
+    for item in items:
+        given = item.callspec.params if hasattr(item, "callspec") else {}
+        model, name = given.get("model"), given.get("name", given.get("method"))
+        if not isinstance(model, Model) or name not in METHODS or given.get("engine") == "plain":
+            continue
+        law = "own" if model.law == "steered" else model.law
+        if law != "true" and "kernels_as_python" not in item.fixturenames and name not in ahead(law):
+            item.add_marker(pytest.mark.long)
+
+
+@cache
+def ahead(law: str) -> set[str]:
+    """The methods whose kernels for chains of this law the short suite compiles."""
+    return {method.name for methods in sharing(law, tested=True) for method in methods}
 
 
 class Model(NamedTuple):

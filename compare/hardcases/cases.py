@@ -19,7 +19,19 @@ from compare.hardcases.problems import (
     twisted,
     waves,
 )
-from compare.hardcases.runs import CONSERVING, FIXED, GAUSS, PEERS, RADAU, TAKE_LOADS, USUAL_METHODS, Expectation, Found, motion
+from compare.hardcases.runs import (
+    CONSERVING,
+    EXPLICIT,
+    FIXED,
+    GAUSS,
+    PEERS,
+    RADAU,
+    TAKE_LOADS,
+    USUAL_METHODS,
+    Expectation,
+    Found,
+    motion,
+)
 from discs import Problem
 from discs.loads import Damping, Motor, OnRod, Rest, Slope, Torque, signals
 
@@ -143,7 +155,8 @@ def cases(quick: bool = False) -> list[Case]:
     few = "few discs", "a chain needs at least one bend"
     add(few[0], "N = 3", few[1], exactly("energy to 1e-12", energy=1e-12, error=0.1), partial(motion, partial(twisted, 3)))
     two = partial(motion, partial(lumped, "steered_rod", 2))
-    add(few[0], "own headings, N = 2", few[1], exactly("energy to 1e-10", energy=1e-10, error=0.1), two)
+    able = tuple(m for m in USUAL_METHODS if not quick or m not in EXPLICIT)  # quick: no kernels for one case
+    add(few[0], "own headings, N = 2", few[1], exactly("energy to 1e-10", energy=1e-10, error=0.1), two, methods=able)
     refused = Expectation("must refuse", "a ValueError that says how many discs are needed", says="at least")
     add(few[0], "N = 2", few[1], refused, partial(motion, partial(twisted, 2)))
     add(few[0], "own headings, N = 1", few[1], refused, partial(motion, partial(lumped, "steered_rod", 1)))
@@ -156,7 +169,7 @@ def cases(quick: bool = False) -> list[Case]:
 
     for setting, (what, n, loads) in LOADED.items():
         words = "energy less work and dissipation is constant to 1e-10, of the largest of the three"
-        run = partial(motion, partial(loaded, n, *loads), compared=False)
+        run = partial(motion, partial(loaded, n, *loads, **({"duration": 1.0} if quick else {})), compared=False)
         able = tuple(m for m in TAKE_LOADS if m != "rk4" or not any(isinstance(load, Motor) for load in loads))
         add("loads", f"{setting}, N = {n}", what, exactly(words, energy=1e-10), run, methods=able)
 

@@ -1,5 +1,9 @@
-"""`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it."""
+"""`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it.
 
+With `--tested` those that the short suite runs: of discs with own headings not the explicit methods.
+"""
+
+import argparse
 import subprocess
 import sys
 from typing import Any
@@ -14,35 +18,47 @@ ONES = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiff
 STEERED = ("heading_inertia", "stretch_stiffness", "shear_stiffness")
 
 
-def sharing() -> list[list[Integrator]]:
-    """All methods with a compiled form, grouped by the kernels that they share: those with parameters of one type, and the adaptive
-    ones."""
+def sharing(law: str, tested: bool = False) -> list[list[Integrator]]:
+    """All methods with a compiled form, or those whose kernels for chains of this law are tested.
+
+    They are grouped by the kernels that they share: those with parameters of one type, and the adaptive ones.
+    """
     found: dict[type, list[Integrator]] = {}
     for method in (cls() for cls in METHODS.values()):
         if method.compiles:
             found.setdefault(type(method.parameters) if isinstance(method, FixedStep) else Integrator, []).append(method)
-    return list(found.values())
+    some = TESTED.get(law, METHODS) if tested else METHODS
+    return [methods for methods in found.values() if any(method.name in some for method in methods)]
 
 
 KINDS = {"slaved": tuple(ROLLING), "own": ("own",)}  # of chains; laws in one process share what does not depend on the law
+TESTED = {"own": ("midpoint", "gauss6", "DOP853")}  # by the short suite; of other chains all
 
 
-def compile_for(law: str) -> None:
-    """Compile every kernel for one kind of chain: slaved headings with this law of rolling, or "own" headings."""
+def compile_for(law: str, tested: bool) -> None:
+    """Compile every kernel for one kind of chain, or those that are tested: slaved headings with a law, or "own" headings."""
     steered = law == "own"
     values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + STEERED if steered else ONES, 1.0)
     chain: Chain | SteeredChain = SteeredChain(**values) if steered else Chain(**values, rolling=law)
     words = "discs with own headings" if steered else f"discs with slaved headings, {law} law"
     problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if steered else None), 0.01)  # at rest
-    for methods in sharing():
+    for methods in sharing(law, tested):
         simulate(problem, methods[0], 0.005, frames=1, progress=False)
         print(f"{words}: {', '.join(method.name for method in methods)} compiled", flush=True)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        for law in KINDS[sys.argv[1]]:
-            compile_for(law)
-    else:  # in parallel, one process each
-        both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", kind]) for kind in KINDS]
+    asked = argparse.ArgumentParser(prog="python -m discs.kernels", description="Compile all kernels ahead, once per machine.")
+    asked.add_argument(
+        "kinds", nargs="*", metavar="KIND", help=f"of chains, {' or '.join(KINDS)}; all, each in a process, if none is given"
+    )
+    asked.add_argument("--tested", action="store_true", help="only those that the short suite runs")
+    given = asked.parse_args()
+    if unknown := set(given.kinds) - KINDS.keys():
+        asked.error(f"KIND is {' or '.join(KINDS)}; got {', '.join(sorted(unknown))}")
+    for law in (law for kind in given.kinds for law in KINDS[kind]):
+        compile_for(law, given.tested)
+    if not given.kinds:  # in parallel
+        more = ["--tested"] * given.tested
+        both = [subprocess.Popen([sys.executable, "-m", "discs.kernels", kind, *more]) for kind in KINDS]
         sys.exit(max(process.wait() for process in both))

@@ -40,9 +40,7 @@ SHORT = {
 BOUND = {"IDA, multipliers": 1e-3, "Exudyn, generic": 3e-4, "Exudyn, wheels and beams": 3e-4, "MuJoCo, friction, damped": 3e-2}
 
 
-@pytest.mark.parametrize(
-    "name", ["uneven", "uneven true", *(pytest.param(name, marks=pytest.mark.long) for name in ("unit", "uneven own"))]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name == "uneven" else pytest.mark.long) for name in SHORT])
 def test_peers_solve_the_same_problem(name):
     problem: Problem = SHORT[name]
     exact, floor = reference(problem)

@@ -18,6 +18,7 @@ def row_of(index, seconds=20.0):
     return Row(*examine([3, index, seconds]))
 
 
+@pytest.mark.slow
 def test_problems_are_of_all_kinds():
     drawn = [random_problem(3, index) for index in range(60)]
     assert {row.law for _, _, row in drawn} == {"field", "unit", "true", "own"}
@@ -28,6 +29,7 @@ def test_problems_are_of_all_kinds():
     assert tol == drawn[7][1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", SAMPLE)
 def test_tolerances_are_kept(index):
     row = row_of(index)
@@ -44,6 +46,7 @@ def test_a_tolerance_below_the_rounding_of_sweeps_is_refused_at_once():
     assert caught.value.best.stats["steps"] < 5000
 
 
+@pytest.mark.slow
 def test_wrong_runs_and_refusals_are_told(monkeypatch):
     true = module.simulate
 
@@ -67,6 +70,7 @@ def test_wrong_runs_and_refusals_are_told(monkeypatch):
     assert "NOT TRUE" in Runs([row], []).summary()
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path, capsys):
     out = tmp_path / "out"
     arguments = ["trust", "--problems", "1", "--seed", "3", "--seconds", "20", "--quiet", "--out", str(out)]

@@ -46,6 +46,7 @@ BASE = "import numpy as np\nK = {'a': np.arange(3)}\ndef g(x): return x + 1\ncla
 F = "def f(n, scale=2.0):\n  def inner(): return [g(n) for _ in range(2)]\n  return K, C().m(), inner(), scale\n"
 
 
+@pytest.mark.slow
 def test_fingerprints():
     """The same for the same text, in another process too; another one for whatever a function is made of."""
     same = fingerprint(made(BASE + F))

@@ -69,6 +69,7 @@ def test_what_the_step_keeps(closed):
     assert orders(swings) == pytest.approx(2.0, abs=0.1), swings
 
 
+@pytest.mark.slow
 def test_energy_does_not_drift():
     """Over 1200 steps, several swings of the rod: no more in the second half than in the first, and no shift of the mean."""
     energy = moving(17, 0.02, duration=24.0, frames=401).energy

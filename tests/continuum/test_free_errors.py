@@ -118,6 +118,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_estimates_are_of_the_size_of_the_errors(name):
     """All quantities, against four times the nodes and steps."""
@@ -140,6 +141,7 @@ def test_estimates_are_of_the_size_of_the_errors(name):
             assert 0.4 < run.error_estimate[quantity] / error < 5, (quantity, error)
 
 
+@pytest.mark.slow
 def test_tension_that_is_far_off_is_warned_of():
     """Places look right on 41 nodes; the tension is off by 40 %."""
     run, words = said(go, straight, whip(0.3), 41, 0.01, 1.0, estimate=True)
@@ -257,6 +259,7 @@ def judged(seed):
     return words, energy, max(float(np.abs(getattr(run, q) - getattr(finer, q)).max()) for q in ("x", "y")) / case["rod"].length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_no_random_rod_is_off_without_a_word(seed):
     """Energy by 5 %, or places by 5 % of the length beside a quarter of the step. As a script, this file runs 300 of them."""

@@ -162,6 +162,7 @@ def test_links_of_length_k_are_taken():
     np.testing.assert_allclose(np.hypot(np.diff(run.x[0]), np.diff(run.y[0])), 0.05, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("r0", "v0", "closed", "n", "dt"),
     [

@@ -106,6 +106,7 @@ def test_rotary_inertia_of_a_beam():
     assert same(equation, -rho * y.diff(t, 2) + alpha * y.diff(t, 2, s, 2) - K * y.diff(s, 4))
 
 
+@pytest.mark.slow
 def test_vakonomic_rod_differs():
     """By hand from L + lambda (x. + R theta. y') + mu (y. - R theta. x'): rates of the multipliers in place of forces."""
     lam, mu = ROD.multipliers

@@ -123,6 +123,7 @@ def test_a_rod_rolls_down_a_slope():
     assert not run.work.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("c", [0.5, 1e4])
 def test_dampers_stop_roll_and_turn_exponentially(c):
     """However stiff; without stress the sections turn each by itself."""
@@ -192,6 +193,7 @@ def test_loads_that_cannot_be_taken_are_refused(loads, message):
         field(plain(*loads))
 
 
+@pytest.mark.slow
 def test_a_sudden_rest_shape_says_why_it_is_slow():
     """It violates the end condition at t = 0, and a front of phi' runs along the rod."""
     with pytest.raises(ValueError, match=r"errors fall slowly: .* start them smoothly, as by signals.smooth"):

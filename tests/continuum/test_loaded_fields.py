@@ -156,6 +156,7 @@ def test_steps_do_not_jump_over_a_signal(signal, area):
     assert run.stats["steps"] < 80
 
 
+@pytest.mark.slow
 def test_a_free_end_has_its_rest_curvature_and_a_known_stretch(rolling):
     """At both ends: |r'| = exp(-R kappa_0 dtheta) by the field law, 1 - R kappa_0 dtheta by the unit law, from a rod on an arc."""
     kappa = 0.4

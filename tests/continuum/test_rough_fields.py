@@ -20,6 +20,7 @@ def test_a_point_load_inside_the_rod_is_refused_at_once_and_spread_it_is_not():
     assert solve(replace(scene, loads=(spread,)), 1e-5, progress=False).error_estimate["theta"] < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_motion_that_becomes_rough_says_when_and_why():
     """A torque folds the line: at t = 3.4 |r'| falls to a tenth, and more functions do not help; no slow size is tried."""

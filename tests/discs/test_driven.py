@@ -294,7 +294,7 @@ TABLE = np.array([0.0, 0.8, 0.9, 0.1])
 @pytest.mark.parametrize(
     ("drive", "way"),
     [
-        (lambda t, q: np.clip(t, 0, 1), 2.5),
+        pytest.param(lambda t, q: np.clip(t, 0, 1), 2.5, marks=pytest.mark.long),
         (lambda t, q: np.interp(t, np.arange(4), TABLE), TABLE[:-1].sum() + (TABLE[-1] - TABLE[0]) / 2),
     ],
 )

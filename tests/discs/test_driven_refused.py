@@ -45,6 +45,7 @@ def test_what_is_no_force_or_drive_is_refused(given, message):
         one(**given).integrate([0], [0], [0, 2.0], progress=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "message"),
     [

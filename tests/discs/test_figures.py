@@ -16,6 +16,7 @@ def run_of(ends="springs", law="field", frames=5, want=(), n=9):
     return simulate(uneven(n, Model(ends, law)), dt=0.05, frames=frames, want=want, progress=False)
 
 
+@pytest.mark.slow
 def test_imports_are_light_and_open_no_window():
     code = """
 import sys
@@ -138,6 +139,7 @@ def test_bad_input(draw, message):
         draw(run_of(frames=2))
 
 
+@pytest.mark.slow
 def test_one_frame_has_no_first_look():
     with pytest.raises(ValueError, match="needs at least two frames; got 1"):
         run_of(frames=1).plot()

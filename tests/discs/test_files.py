@@ -50,6 +50,7 @@ def begun(path, *code):
     return process
 
 
+@pytest.mark.slow
 def test_the_second_of_two_runs_on_a_path_is_refused(tmp_path, capsys):
     path = tmp_path / "run.nc"
     first = begun(path)
@@ -70,6 +71,7 @@ WITHOUT_LOCKS = (
 )
 
 
+@pytest.mark.slow
 def test_without_locks_the_first_run_stops_and_reports_nothing_of_the_second(tmp_path):
     """On a file system without locks, another run may take the path."""
     path = tmp_path / "run.nc"
@@ -207,6 +209,7 @@ def test_other_endings_are_refused(name, tmp_path, capsys):
     same(load(tmp_path / "A.NC4"), run)
 
 
+@pytest.mark.slow
 def test_what_a_kill_leaves_of_a_save_is_removed_by_the_next(tmp_path):
     code = (
         "import os, sys, signal; from discs import simulate; from discs.files import framefile;"

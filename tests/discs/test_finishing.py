@@ -75,6 +75,7 @@ assert load(sys.argv[1] + "/run.nc").x.tobytes() == run.x.tobytes()
 MOUNT = 'mount -t tmpfs -o size=600k tmpfs "$1" && exec "$2" -c "$3" "$1"'
 
 
+@pytest.mark.slow
 def test_a_disc_with_room_for_the_file_once(tmp_path):
     """On a file system of 600 kB the end of a run needs no further space, and a file that does not fit is refused at the start."""
     unshare = shutil.which("unshare")

@@ -35,6 +35,7 @@ print([(w.filename, w.lineno, str(w.message)[:31]) for w in told], tiny.twice(21
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["", "cache", "nowhere/cache"])
 def test_without_a_folder_for_the_cache(folder, tmp_path):
     """A read-only package and no home: __pycache__ is a file, which stops root too."""

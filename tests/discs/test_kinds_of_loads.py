@@ -128,10 +128,11 @@ def test_loads_of_every_kind_move_discs_as_the_saddle_point_says(model, kernels_
     if not isinstance(problem.chain, SteeredChain):
         again.append(of_bends(loads, problem))
     expected, multipliers = by_multipliers(replace(problem, loads=tuple(again)))
-    for name, close in CLOSE.items():
-        for engine in ("compiled", "plain") if name in ("midpoint", "gauss6") else ("compiled",):
+    implicit = "midpoint", "gauss6"
+    for name in CLOSE if model in (KINDS[0], KINDS[-1]) else implicit:
+        for engine in ("compiled", "plain") if name in implicit else ("compiled",):
             found, contact_force = by_discs(replace(problem, loads=loads), name, engine)
-            np.testing.assert_allclose(found, expected, rtol=0, atol=close, err_msg=f"{name}, {engine}")
+            np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE[name], err_msg=f"{name}, {engine}")
     np.testing.assert_allclose(contact_force, multipliers, rtol=0, atol=1e-5)
 
 

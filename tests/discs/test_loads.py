@@ -198,6 +198,7 @@ class Wind(Load):
         return -0.2 * np.abs(v) * v + (0.1 if t > 0.3 else 0.0)
 
 
+@pytest.mark.slow
 def test_a_load_without_a_compiled_form_runs_on_the_plain_engine():
     problem = uneven(5, Model("springs", "unit"))
     run = simulate(replace(problem, loads=(Wind((3, 5)),)), "rk4", 0.001, 2, progress=False)

@@ -133,6 +133,7 @@ def test_a_snake_with_wheels_along_its_line_rolls_along_it():
     np.testing.assert_allclose(run.phi, psi, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_driven_rest_shape_does_the_work_of_its_links():
     """-int S (a - e) e' dt over the motion, by quadrature of fine frames; also the work of a cycle of an actuator."""
     problem = replace(uneven(7, KINDS[0]), loads=(Rest(twist=0.7, signal=signals.sine(1.0, 5.0)),))
@@ -165,6 +166,6 @@ def along_y(stiffness: float, problem: Problem):
 def test_the_balance_stays_exact_over_many_steps(engine, kernels_as_python):
     problem = uneven(4, Model("consistent", "field"))
     problem = replace(problem, loads=every(problem))
-    run = simulate(replace(problem, duration=40.0), Midpoint(tolerance=1e-15, sweeps=30), 0.02, 21, progress=False, engine=engine)
+    run = simulate(replace(problem, duration=16.0), Midpoint(tolerance=1e-15, sweeps=30), 0.02, 21, progress=False, engine=engine)
     largest = max(abs(part).max() for part in (run.energy, run.work, run.dissipated))
     assert abs(run.energy - run.energy[0] - run.work + run.dissipated).max() < 1e-13 * largest

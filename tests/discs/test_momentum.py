@@ -152,6 +152,7 @@ def test_the_momentum_is_not_kept_and_a_wrong_equation_is_noticed():
     assert np.abs(turned.residual()).max() > 0.05
 
 
+@pytest.mark.slow
 def test_sleigh_against_its_closed_form():
     """<p, xi_Q> = along m u + turn J phi. for xi_Q = along (cos phi, sin phi, 0) + turn (0, 0, 1); p has no part across."""
     book = CLOSED["sleigh"]
@@ -171,6 +172,7 @@ def test_sleigh_against_its_closed_form():
     assert np.abs(symmetry_momenta(book.system, dense, path.q, path.v).residual()).max() < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "size"), [("disc", 2), ("disc on an incline", 1), ("knife edge", 1), ("particle", 2)])
 def test_what_the_constraints_leave(name, size):
     book = CLOSED[name]

@@ -48,6 +48,7 @@ def crank(t, rod=1.0):
     return brentq(lambda a: time(a) - t, 1.0, 1 + 5 * t, xtol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "rtol", "bound"),
     [
@@ -72,6 +73,7 @@ def test_a_crank_and_a_rod_go_through_where_ways_part(method, rtol, bound):
         np.testing.assert_allclose(path.stats["rank_drops"][0], 0.6123, atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("longer", [1e-2, 1e-4, 1e-6])
 def test_a_rod_that_is_longer_turns_back(longer):
     """A motion that misses the branch point is not branched."""
@@ -96,6 +98,7 @@ def test_a_parallelogram_goes_through_flat():
     np.testing.assert_allclose(path.q, [[1, 0, 1], [3, 0, 3], [7, 0, 7]], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_way_that_is_not_smooth_ends_in_words():
     """A cusp, y^2 = x^3, reached from (1, 1) at speed 1 after the length of the arc, ((1 + 9/4)^1.5 - 1) 8/27 = 1.43971."""
     system = MechanicalSystem.from_lagrangian(
@@ -166,6 +169,7 @@ def test_units_of_chains_do_not_matter(model, power):
     np.testing.assert_allclose(found.q * units, plain.q, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_skate_of_a_micrometre_in_si_units():
     """Mass 1.3e-15 kg, length 1e-6 m: by formulas, against the same in micrometres."""
 
@@ -190,12 +194,14 @@ def pendulum():
     return MechanicalSystem.from_lagrangian(("x", "y"), np.eye(2), lambda q: 9.81 * q[1], lambda q: [[q[0], q[1]]], ("rod",))
 
 
+@pytest.mark.slow
 def test_the_rod_of_a_pendulum_keeps_its_length():
     path = pendulum().integrate([1, 0], [0, 0], np.linspace(0, 20, 5), 1e-4, progress=False)
     np.testing.assert_allclose(np.hypot(*path.q.T), 1, atol=1e-5)
     assert np.abs(path.energy).max() < 0.02
 
 
+@pytest.mark.slow
 def test_lost_energy_is_said():
     with pytest.warns(UserWarning, match=r"RK23: energy is conserved, but at t = .* and not 0: the motion may not be trusted"):
         pendulum().integrate([1, 0], [0, 0], np.linspace(0, 40, 5), 1e-2, method="RK23", progress=False)
@@ -226,6 +232,7 @@ def test_named_methods_agree_and_unknown_ones_are_refused():
         book.integrate([0.0, 1.0], 1e-300)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOSED)
 @pytest.mark.parametrize("times", [(1.0, 2.0, 3.0, 4.0), (4.0,), (-1.0, 0.0, 2.0), (-2.0, -1.0), (0.0,)])
 def test_textbooks_start_at_zero_whatever_times_are_asked_for(name, times):
@@ -246,6 +253,7 @@ def test_systems_without_constraints():
     np.testing.assert_allclose(system.reduced([1, 0], [0, 1]).acceleration, [-1, 0], atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_potential_that_is_infinite_names_place_or_time():
     kepler = MechanicalSystem.from_lagrangian(("x", "y"), np.eye(2), lambda q: -1 / np.linalg.norm(q), **FREE)
     with pytest.raises(ValueError, match=r"V must be finite at the start; V\(q\) = -inf"):

@@ -160,6 +160,7 @@ def test_fewer_sweeps_are_counted():
     assert run.stats["unconverged"] == 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["compiled", "plain"])
 def test_a_step_of_several_substeps_counts_once(engine, kernels_as_python):
     with pytest.warns(UserWarning, match=r"suzuki4: 4 of 4 steps did not converge"):

@@ -94,6 +94,7 @@ def pendulum(skew):
     return driver
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("book", "driver"),
     [(contact(), harmonic), (driven(0.0), pendulum(0.0)), (driven(0.6), pendulum(0.6))],

@@ -22,6 +22,7 @@ def test_cut_off_files_are_refused(saved):
             load(saved)
 
 
+@pytest.mark.slow
 def test_a_changed_byte_is_never_a_changed_run(run, saved):
     """Every changed byte is detected or does not change the run."""
     whole = saved.read_bytes()

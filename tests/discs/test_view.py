@@ -101,6 +101,7 @@ def test_how_far_lines_between_frames_are_off():
     assert geometry.off_between_frames(replace(faster, stats={"radius": 0.5}), radius) > h**2 / 4
 
 
+@pytest.mark.slow
 def test_one_disc_from_above():
     assert single().plot_motion() is not None
     assert len(single().plot()) == 3

@@ -59,6 +59,7 @@ def test_a_warning_is_raised_where_asked():
             simulate(ROLLING, **QUIET)
 
 
+@pytest.mark.slow
 def test_on_the_command_line_there_is_no_line():
     command = [sys.executable, "-m", "discs", "run", "--n=5", "--t=0.1", "--dt=0.05", "--bending-stiffness=0", "--engine=plain"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
