@@ -155,7 +155,7 @@ def cases(quick: bool = False) -> list[Case]:
     few = "few discs", "a chain needs at least one bend"
     add(few[0], "N = 3", few[1], exactly("energy to 1e-12", energy=1e-12, error=0.1), partial(motion, partial(twisted, 3)))
     two = partial(motion, partial(lumped, "steered_rod", 2))
-    able = tuple(m for m in USUAL_METHODS if not quick or m not in EXPLICIT)  # quick: no kernels for one case
+    able = tuple(m for m in (*USUAL_METHODS, *PEERS) if not quick or m not in EXPLICIT)  # quick: no kernels for one case
     add(few[0], "own headings, N = 2", few[1], exactly("energy to 1e-10", energy=1e-10, error=0.1), two, methods=able)
     refused = Expectation("must refuse", "a ValueError that says how many discs are needed", says="at least")
     add(few[0], "N = 2", few[1], refused, partial(motion, partial(twisted, 2)))
