@@ -169,7 +169,7 @@ def cases(quick: bool = False) -> list[Case]:
 
     for setting, (what, n, loads) in LOADED.items():
         words = "energy less work and dissipation is constant to 1e-10, of the largest of the three"
-        run = partial(motion, partial(loaded, n, *loads, **({"duration": 1.0} if quick else {})), compared=False)
+        run = partial(motion, partial(loaded, n, *loads, duration=1.0 if quick else 4.5), compared=False)
         able = tuple(m for m in TAKE_LOADS if m != "rk4" or not any(isinstance(load, Motor) for load in loads))
         add("loads", f"{setting}, N = {n}", what, exactly(words, energy=1e-10), run, methods=able)
 
