@@ -51,14 +51,17 @@ def timed(problem: Problem, jit: Callable[..., Any]) -> Any:
     if not isinstance(load, Linear):
         raise ValueError(f"peers take loads with a compiled form; got {load!r}")
     kind, others, given, fill, count = type(chain), chain[:-1], chain.load, signals(load, jit), len(load.drives)
-    constant, damping, stiffness, viscosity, patterns = given[:5]
+    constant, damping, stiffness, level, viscosity, patterns, pushed = given[:7]
     bends, spent = given.bends, given.spent
 
     @jit
     def at(t):  # type: ignore[no-untyped-def]
         now, near = np.empty((1, count)), np.zeros(1)
         fill(t, now[0])
-        return kind(*others, table(constant, damping, stiffness, viscosity, patterns, np.array([t]), now, near, bends, spent))
+        times = np.array([t])
+        return kind(
+            *others, table(constant, damping, stiffness, level, viscosity, patterns, pushed, times, now, near, bends, spent)
+        )
 
     return at
 
@@ -68,7 +71,7 @@ def pull(load: Linear | None, jit: Callable[..., Any]) -> Any:
     if load is None:
         return jit(lambda t, q, v, g: None)
     fill, count = signals(load, jit), len(load.drives)
-    constant, damping, stiffness, links, patterns = load.parameters[:5]
+    constant, damping, stiffness, _, links, patterns = load.parameters[:6]
 
     @jit
     def subtract(t, q, v, g):  # type: ignore[no-untyped-def]

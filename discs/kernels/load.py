@@ -20,17 +20,20 @@ class Linear(NamedTuple):
 
     Arrays have no entries for none.
 
-    constant, damping, stiffness : (rows, n). viscosity : (columns, n + 1), of the rates of theta and phi, link j before disc j; B v
-    is the difference of neighbours. patterns : (K, rows, n). times : (M,), increasing. values : (M, K), signals at these times.
-    near : (1,), how far a time may be from one of them. bends : see `discs.kernels.bends`. spent : (4,), work and dissipated energy
-    since the last call from Python, each with its lost digits.
+    constant, damping, stiffness : (rows, n). level : (rows,), of a row: 3 if it has stiffness, otherwise 2 if it has damping,
+    otherwise 1 if it has a constant, otherwise 0. viscosity : (columns, n + 1), of the rates of theta and phi, link j before disc
+    j; B v is the difference of neighbours. patterns : (K, rows, n). pushed : (K, rows), whether a pattern has entries in a row.
+    times : (M,), increasing. values : (M, K), signals at these times. near : (1,), how far a time may be from one of them. bends :
+    see `discs.kernels.bends`. spent : (4,), work and dissipated energy since the last call from Python, each with its lost digits.
     """
 
     constant: NDArray
     damping: NDArray
     stiffness: NDArray
+    level: NDArray
     viscosity: NDArray
     patterns: NDArray
+    pushed: NDArray
     times: NDArray
     values: NDArray
     near: NDArray
@@ -39,7 +42,8 @@ class Linear(NamedTuple):
 
 
 NONE = np.empty((0, 0))
-UNLOADED = Linear(NONE, NONE, NONE, NONE, np.empty((0, 0, 0)), np.empty(0), NONE, np.empty(0), NO_BENDS, np.empty(0))
+FEW, NO_LEVEL, NO_PATTERNS, UNPUSHED = np.empty(0), np.empty(0, int), np.empty((0, 0, 0)), np.empty((0, 0), bool)
+UNLOADED = Linear(NONE, NONE, NONE, NO_LEVEL, NONE, NO_PATTERNS, UNPUSHED, FEW, NONE, FEW, NO_BENDS, FEW)
 
 
 @fill(do.loaded, Linear)
@@ -69,9 +73,13 @@ def _push(load, state, t, move, c, p, factor, g):
         a, rate, to = c[row], p[column(row)], g[column(row)]
         constant, damping, stiffness = load.constant[row], load.damping[row], load.stiffness[row]
         hi, lo, step = state.hi[row], state.lo[row], move[row]
-        for i in range(a.size):
-            f = constant[i] - damping[i] * (a[i] * rate[i]) - stiffness[i] * (hi[i] + (lo[i] + step[i]))
-            to[i] += factor * a[i] * f
+        if load.level[row] > 2:
+            for i in range(a.size):
+                f = constant[i] - damping[i] * (a[i] * rate[i]) - stiffness[i] * (hi[i] + (lo[i] + step[i]))
+                to[i] += factor * a[i] * f
+        elif load.level[row] > 0:
+            for i in range(a.size):
+                to[i] += factor * a[i] * (constant[i] - damping[i] * (a[i] * rate[i]))
     for row in range(load.viscosity.shape[0]):
         a, rate, links, to = c[2 + row], p[row], load.viscosity[row], g[row]
         last = a.size - 1
@@ -90,7 +98,7 @@ def _push(load, state, t, move, c, p, factor, g):
             signal = factor * load.values[place, k] if place >= 0 else np.nan
             for row in range(c.shape[0]):
                 a, pattern, to = c[row], load.patterns[k, row], g[column(row)]
-                for i in range(a.size):
+                for i in range(a.size if load.pushed[k, row] else 0):
                     to[i] += signal * a[i] * pattern[i]
 
 
@@ -99,7 +107,7 @@ def _guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
     for row in range(load.constant.shape[0]):
         a, damping, stiffness = c[row], load.damping[row], load.stiffness[row]
         to = turn if column(row) else roll
-        for i in range(a.size):
+        for i in range(a.size if load.level[row] > 1 else 0):
             to[i] += a[i] * a[i] * (d * damping[i] + g * stiffness[i])
     for row in range(load.viscosity.shape[0]):
         a, links = c[2 + row], load.viscosity[row]

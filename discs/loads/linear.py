@@ -174,10 +174,11 @@ class Linear(Load):
             bends = self.bends.parameters(np.array(driven).reshape(-1, none.size))
         links = np.empty((0, 0)) if self.viscosity is None else self.viscosity
         patterns = np.array([drive.pattern for drive in self.drives]).reshape(-1, *self.constant.shape)
-        none = np.empty((0, len(self.drives)))
-        return load.Linear(
-            self.constant, self.damping, self.stiffness, links, patterns, np.empty(0), none, np.empty(1), bends, np.empty(0)
-        )
+        none, few = np.empty((0, len(self.drives))), np.empty(0)
+        parts = self.constant, self.damping, self.stiffness
+        level = np.max([number * part.any(axis=1) for number, part in enumerate(parts, start=1)], axis=0)
+        pushed: Any = patterns.any(axis=2)
+        return load.Linear(*parts, level, links, patterns, pushed, few, none, np.empty(1), bends, few)
 
     def timed(self, times: Float, h: float) -> Any:
         """For each run and call anew, with sums of its own for work and dissipated energy."""
