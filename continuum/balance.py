@@ -31,9 +31,9 @@ forms of the bundle (bundleF), is zero on the constraint, that is, if Q_r - e Q_
 rolling constraint itself. For the other symmetries it fails: their laws are balances with a source, the nonholonomic momentum
 equation of the paper's conclusions.
 
-Derivatives in s are those of splines of degree 7 through the nodes. lambda follows from x, y, theta and omega at one time, with
-omega. eliminated. d_t D and the Q of the first row are computed by differences in time, so that the violation of the first row is
-measured, too.
+Derivatives in s are those of splines of degree 7 through the nodes. lambda is that of a field with want="contact_force"
+(`continuum.ground`); without it, it follows from x, y, theta and omega at one time, with omega. eliminated. d_t D and the Q of the
+first row are computed by differences in time, so that the violation of the first row is measured, too.
 """
 
 from typing import NamedTuple
@@ -128,8 +128,9 @@ def balances(
         e, p = law.arm(radius, r1) * _turned(r1), np.zeros_like(omega)
         v = e * omega
         e_rate = radius * _turned(law.rate(r1, along(v)))
+        own = run.contact_force if run.problem is None else None  # of a field: per length
         torque = beta * along(run.theta, 2) + beta1 * theta1 - _dot(e, moment2) - rho * omega * _dot(e, e_rate)
-        force = rho * (e * torque / (alpha + rho * _dot(e, e)) + e_rate * omega) + moment2
+        force = rho * (e * torque / (alpha + rho * _dot(e, e)) + e_rate * omega) + moment2 if own is None else own.swapaxes(0, 1)
     n = p * r1 - moment1
     kinetic, elastic = rho * _dot(v, v) + alpha * omega**2, bend * _dot(r2, r2) + beta * theta1**2
     energy, material = 0.5 * (kinetic + elastic), rho * _dot(v, r1) + alpha * omega * theta1

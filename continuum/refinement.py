@@ -18,6 +18,7 @@ from discs.arrays import Float
 
 RATES = ("omega", "phi_rate")
 MOST = 8.0  # largest ratio of an error to a change
+WANTED = 2.5  # the same for wanted quantities: the estimate is then within five of the error from order 0.2 on
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # numbers of elements
 SURE = 4  # changes after which slowly falling errors count as such
 SLOW = 3.0  # order of errors below which fields count as rough
@@ -93,6 +94,7 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progr
             last, smooth = counts.index(count), not resolve(scene).kinks
             used = counts[last - len(changes[-3:]) : last + 1]
             factors = falls(np.array(changes[-3:]), used, np.inf if smooth else 1.0)
+            factors[len(UNKNOWNS) :] = np.minimum(factors[len(UNKNOWNS) :], WANTED)
             estimates = zip(values, factors * changes[-1] + rest, strict=True)
             error = {name: max(float(estimate), found.misfit.get(name, 0.0)) for name, estimate in estimates}
             if over(error, bound) <= 1:

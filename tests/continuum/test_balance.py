@@ -221,3 +221,17 @@ def test_bad_input_is_refused(change, message):
     run = simulate(lump(untwisting_rod(duration=0.1, **ROD), given.pop("n")), frames=given.pop("frames"), progress=False)
     with pytest.raises(ValueError, match=message):
         balances(run=run, **given)
+
+
+@pytest.mark.parametrize("law", ["field", "unit"])
+def test_the_field_s_own_force_is_the_source(law):
+    """That of the ground in `solve` and that of splines are two evaluations; both close the balances away from the ends."""
+    scene = untwisting_rod(law, duration=1.2, **ROD)
+    field = solve(scene, 1e-7, frames=1.0 + 1e-3 * NEAR, want="contact_force", progress=False)
+    own, splines = (balances(scene.rod, run, law) for run in (field, replace(field, contact_force=None)))
+    inside, off = slice(100, -100), {}
+    for name in LAWS[1:]:
+        np.testing.assert_allclose(own[name].source[:, inside], splines[name].source[:, inside], atol=5e-4)
+        off[name] = [np.abs(found[name].residual[:, inside]).max() for found in (own, splines)]
+        assert max(off[name]) < 5e-4 < np.abs(own[name].unforced).max() / 100, (name, off)
+    np.testing.assert_array_equal(own["momentum_x"].source, field.contact_force[:, 0])

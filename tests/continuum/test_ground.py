@@ -11,7 +11,7 @@ from continuum.ground import weights
 from continuum.motion import Runner
 from continuum.wants import ARRAYS, smooth_tests
 from discs import load, simulate
-from discs.loads import Force, Torque
+from discs.loads import Damping, Force, Rest, Slope, Spring, Torque, signals
 
 ROD = {"length": 3.7, "density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.7}
 ALL = tuple(ARRAYS)
@@ -118,18 +118,32 @@ def test_the_ground_alone_changes_momentum(rolling):
     np.testing.assert_allclose(found.energy_flux[:, [0, -1]], 0.0, atol=found.error_estimate["energy_flux"])
 
 
+RAMP = signals.smooth(0.0, 1.0)
+LOADS = (
+    Slope(0.3, -0.2),
+    Damping(rolling=0.2, torsion=0.1, bending=0.05),
+    Spring(0.0, 0.0, 0.4),
+    Force(lambda s: 0.3 * s, 0.1, RAMP),
+    Force(0.4, 0.5, RAMP, at=3.7),
+    Torque(0.3, RAMP, at=0.0),
+    Rest(twist=lambda s: 0.1 * s, curvature=0.4, signal=RAMP),
+)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["field", "unit", "own"])
+@pytest.mark.parametrize("law", ["field", "unit", "own", "loads"])
 def test_forces_on_discs_tend_to_the_moments(law):
     """Sums over discs, which know nothing of ends: at order two to int lambda eta + force . eta + couple . eta' of the field."""
-    scene = Scene(rod=Rod(**ROD), initial=lopsided, duration=1.0, rolling="field" if law == "own" else law)
+    scene = Scene(rod=Rod(**ROD), initial=lopsided, duration=1.0, rolling="unit" if law == "unit" else "field")
     scene = steered_rod(duration=1.0, **ROD) if law == "own" else scene
-    found = field(scene, 1e-6, frames=[1.0])
+    scene = replace(scene, loads=LOADS) if law == "loads" else scene
+    found = field(scene, 1e-4 if law == "loads" else 1e-6, frames=[1.0])
+    method = "midpoint" if law == "loads" else "suzuki4"
     ends = {} if law == "own" else {"ends": "consistent"}
     sums = []
     for n in (33, 65, 129):
         problem = lump(scene, n, **ends)
-        run = simulate(problem, "suzuki4", dt=1 / (4 * n), frames=[1.0], want="contact_force", progress=False)
+        run = simulate(problem, method, dt=1 / (4 * n), frames=[1.0], want="contact_force", progress=False)
         eta = smooth_tests(problem.chain.s, scene.rod.length, scene.closed)[0]
         sums.append(run.contact_force[0] @ eta.T)
         inside = slice(n // 4, -(n // 4))
@@ -138,7 +152,7 @@ def test_forces_on_discs_tend_to_the_moments(law):
     errors = [np.abs(each - found.contact_moments[0]).max() for each in sums]
     assert errors[0] > 1e-3
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.3)
-    assert np.abs((4 * sums[2] - sums[1]) / 3 - found.contact_moments[0]).max() < errors[2] / 5
+    assert np.abs((4 * sums[2] - sums[1]) / 3 - found.contact_moments[0]).max() < errors[2] / 4
     if law == "own":
         assert not found.end_couple.any()
 
@@ -169,6 +183,7 @@ SCENES = {
     "unit": untwisting_rod("unit", duration=3.0),
     "stretched field": Scene(rod=Rod(**ROD), initial=uneven, duration=1.5),
     "ring": replace(breathing_ring("field", duration=0.6, **ROD), initial=wavy),
+    "own": steered_rod(duration=1.5, **ROD),
     "varying": untwisting_rod("field", duration=1.5, bending_stiffness=lambda s: 0.7 + 0.1 * np.sin(s), **VARYING),
 }
 
@@ -180,7 +195,7 @@ def test_estimates_are_within_five_of_the_errors(name):
     for tol in (1e-3, 1e-4, 1e-5):
         found = field(scene, tol, frames=12)
         for key, estimate in found.error_estimate.items():
-            if key == "energy":
+            if key == "energy" or (name, key) == ("own", "end_couple"):  # no couple with own headings
                 continue
             error = np.abs(getattr(found, key) - getattr(truth, key)).max()
             assert error / 5 < estimate < 5 * error or error < 10 * truth.error_estimate[key], (key, tol, error, estimate)
