@@ -149,6 +149,10 @@ def test_forces_on_discs_tend_to_the_moments(law):
         inside = slice(n // 4, -(n // 4))
         every = found.contact_force[0][:, :: (found.s.size - 1) // (n - 1)]
         assert np.abs(run.contact_force[0] / problem.chain.w - every)[:, inside].max() < 100 / n**2
+    eta, eta1, _ = smooth_tests(found.s, scene.rod.length, scene.closed)
+    parts = eta * weights(found.s, scene.closed) @ found.contact_force[0].T
+    parts += eta[:, [0, -1]] @ found.end_force[0] + eta1[:, [0, -1]] @ found.end_couple[0]
+    np.testing.assert_allclose(parts.T, found.contact_moments[0], atol=2e-3)
     errors = [np.abs(each - found.contact_moments[0]).max() for each in sums]
     assert errors[0] > 1e-3
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.3)
