@@ -11,7 +11,7 @@ from continuum.ground import weights
 from continuum.motion import Runner
 from continuum.wants import ARRAYS, smooth_tests
 from discs import load, simulate
-from discs.loads import Damping, Force, Rest, Slope, Spring, Torque, signals
+from discs.loads import Damping, Force, Motor, Rest, Slope, Spring, Torque, signals
 
 ROD = {"length": 3.7, "density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.7}
 ALL = tuple(ARRAYS)
@@ -130,13 +130,34 @@ LOADS = (
 )
 
 
+def parts(found, length):
+    """The last frame's force inside and what acts at the ends, against the test functions, (2, 5)."""
+    eta, eta1, _ = smooth_tests(found.s, length, False)
+    force = eta * weights(found.s, False) @ found.contact_force[-1].T
+    return (force + eta[:, [0, -1]] @ found.end_force[-1] + eta1[:, [0, -1]] @ found.end_couple[-1]).T
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_motor_at_an_end_acts_on_the_ground(own):
+    """Its torque is among those that the force at the end balances."""
+    scene = steered_rod(duration=1.0, twist=0.0, **ROD) if own else untwisting_rod("unit", duration=1.0, twist=0.0, **ROD)
+    scene = replace(scene, loads=(Motor(lambda t: 1.5 * RAMP(t), at=0.0), Damping(torsion=0.1)))
+    found = field(scene, 1e-4, frames=[1.0])
+    assert np.abs(found.reaction).max() > 0.1
+    np.testing.assert_allclose(parts(found, 3.7), found.contact_moments[0], atol=2e-3)
+
+
+VARYING = {"density": lambda s: 1 + 0.2 * s, "torsion_stiffness": lambda s: 0.8 + 0.1 * s, "radius": lambda s: 1 - 0.05 * s}
+VARIES = untwisting_rod("field", duration=1.0, bending_stiffness=lambda s: 0.7 + 0.1 * np.sin(s), **VARYING)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["field", "unit", "own", "loads"])
+@pytest.mark.parametrize("law", ["field", "unit", "own", "loads", "varying"])
 def test_forces_on_discs_tend_to_the_moments(law):
     """Sums over discs, which know nothing of ends: at order two to int lambda eta + force . eta + couple . eta' of the field."""
     scene = Scene(rod=Rod(**ROD), initial=lopsided, duration=1.0, rolling="unit" if law == "unit" else "field")
     scene = steered_rod(duration=1.0, **ROD) if law == "own" else scene
-    scene = replace(scene, loads=LOADS) if law == "loads" else scene
+    scene = replace(scene, loads=LOADS) if law == "loads" else VARIES if law == "varying" else scene
     found = field(scene, 1e-4 if law == "loads" else 1e-6, frames=[1.0])
     method = "midpoint" if law == "loads" else "suzuki4"
     ends = {} if law == "own" else {"ends": "consistent"}
@@ -149,10 +170,7 @@ def test_forces_on_discs_tend_to_the_moments(law):
         inside = slice(n // 4, -(n // 4))
         every = found.contact_force[0][:, :: (found.s.size - 1) // (n - 1)]
         assert np.abs(run.contact_force[0] / problem.chain.w - every)[:, inside].max() < 100 / n**2
-    eta, eta1, _ = smooth_tests(found.s, scene.rod.length, scene.closed)
-    parts = eta * weights(found.s, scene.closed) @ found.contact_force[0].T
-    parts += eta[:, [0, -1]] @ found.end_force[0] + eta1[:, [0, -1]] @ found.end_couple[0]
-    np.testing.assert_allclose(parts.T, found.contact_moments[0], atol=2e-3)
+    np.testing.assert_allclose(parts(found, scene.rod.length), found.contact_moments[0], atol=2e-3)
     errors = [np.abs(each - found.contact_moments[0]).max() for each in sums]
     assert errors[0] > 1e-3
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.3)
@@ -181,14 +199,13 @@ def wavy(s):
     return a * np.cos(turn) * (1 + 0.03 * np.cos(turn)), a * np.sin(turn), 0.2 * np.sin(turn), -0.2 + 0.1 * np.cos(turn)
 
 
-VARYING = {"density": lambda s: 1 + 0.2 * s, "torsion_stiffness": lambda s: 0.8 + 0.1 * s, "radius": lambda s: 1 - 0.05 * s}
 SCENES = {
     "field": untwisting_rod("field", duration=3.0),
     "unit": untwisting_rod("unit", duration=3.0),
     "stretched field": Scene(rod=Rod(**ROD), initial=uneven, duration=1.5),
     "ring": replace(breathing_ring("field", duration=0.6, **ROD), initial=wavy),
     "own": steered_rod(duration=1.5, **ROD),
-    "varying": untwisting_rod("field", duration=1.5, bending_stiffness=lambda s: 0.7 + 0.1 * np.sin(s), **VARYING),
+    "varying": replace(VARIES, duration=1.5),
 }
 
 
