@@ -16,7 +16,7 @@ from compare.results import Row, WorkPrecision
 from continuum import untwisting_rod
 from discs import Problem
 from discs.kernels import driver
-from discs.loads import Damping, Force, Rest, Slope, Spring, Torque, signals
+from discs.loads import Damping, Force, Motor, Rest, Slope, Spring, Torque, signals
 from tests.conftest import Model, uneven
 
 pytestmark = pytest.mark.slow
@@ -59,6 +59,17 @@ def test_peers_solve_the_same_problem(name):
         q = peer.run(setting, 60.0).q
         error = (np.abs(q - exact).max(axis=1) / np.abs(exact).max(axis=1)).max()
         assert error < BOUND.get(peer.name, 1e-4), (peer.name, setting, error)
+
+
+def test_loads_that_peers_do_not_take_are_refused():
+    problem = uneven(7, Model("springs", "field"))
+    motor = Motor(float(problem.initial.omega[2]), problem.chain.s[2])
+    for load, words in (
+        (motor, "peers take no motors; got a problem with a Motor"),
+        (Torque(1.0, lambda t: t), "Torque: peers take signals of discs.loads.signals"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            peers(replace(problem, loads=(load,)))
 
 
 def test_failures_stay_in_the_table():
