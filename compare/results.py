@@ -56,6 +56,12 @@ class Study:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
 
+    def reaching(self, error: float) -> int:
+        """The number of discs at which all errors fall to this one, by the power law through the last two rows."""
+        worst = self.error.max(axis=1)[-2:]
+        order = np.log(worst[0] / worst[1]) / np.log(self.k[-2] / self.k[-1])
+        return int(np.ceil(self.scene.rod.length / (self.k[-1] * (error / worst[1]) ** (1 / order)))) + (self.ends != "ring")
+
     def rows(self) -> list[tuple[str, ...]]:
         """The table as text, a row for each n."""
         orders = [("",) * len(self.fields)] + [tuple(f"{o:.2f}" if np.isfinite(o) else "-" for o in row) for row in self.order]

@@ -47,16 +47,23 @@ def convergence(
         composed = Gauss6(tolerance=1e-10) if viscous(scene) else Suzuki4(Midpoint(tolerance=1e-10))
         method = Gauss8(tolerance=1e-13) if degree == 2 else composed
     fields = compared(scene)
-    limit = {name: spline(scene, field.s, _periodic(scene, name, field)[-1:]) for name in fields}
     error = np.empty((len(problems), len(fields)))
     bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
         run = simulate(problem, method, h, frames=1, progress=progress and i == 0)  # the first may report that kernels are compiled
-        for j, name in enumerate(fields):
-            error[i, j] = np.abs(_periodic(scene, name, run)[-1] - limit[name](run.s)[:, 0]).max()
+        error[i] = apart(scene, run, field)
     floor = max(field.error_estimate[name] for name in fields)
     k = np.array([problem.chain.k for problem in problems])
     return Study(scene, "elements" if degree == 2 else problems[0].chain.ends, sizes, k, error, floor, h)
+
+
+def apart(scene: Scene, run: Solution, field: Solution) -> Float:
+    """Largest differences of a run of discs from the field at the end, over the discs, (fields,)."""
+    found = []
+    for name in compared(scene):
+        limit = spline(scene, field.s, _periodic(scene, name, field)[-1:])
+        found.append(np.abs(_periodic(scene, name, run)[-1] - limit(run.s)[:, 0]).max())
+    return np.array(found)
 
 
 def checked_sizes(scene: Scene, n: ArrayLike, ends: str, degree: int = 1) -> tuple[Int, list[Problem]]:

@@ -26,7 +26,7 @@ from discs.arrays import Float, Int
 G = 1 / np.sqrt(3.0)
 NEAR, FAR = 0.5 + G, 0.5 - G
 # of the three discs of an element, at its two strain points: k q' and q
-SLOPES = np.array([[-NEAR, 2 * G, -FAR], [FAR, -2 * G, NEAR]])
+SLOPES = np.array([[-NEAR, 2 * G, FAR], [-FAR, -2 * G, NEAR]])
 VALUES = np.array([[1 + 3 * G, 4.0, 1 - 3 * G], [1 - 3 * G, 4.0, 1 + 3 * G]]) / 6
 
 

@@ -215,7 +215,7 @@ class SteeredSystem(RollingDiscs):
 
     @cached_property
     def parameters(self) -> Parameters:
-        if self._degree == 2 or (self.load is not None and self.load.parameters is None):
+        if self.load is not None and self.load.parameters is None:
             return None
         from discs.kernels import steered  # numba is slow to import
 

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.chains.chain import SteeredChain
+from discs.chains.elements import SLOPES, VALUES
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.load import UNLOADED
 from discs.kernels.shared import forward, renew
+from discs.kernels.steered_elements import to_points
 from discs.kernels.steered_links import pull, pulled, secant, spread, strains, turn
 from discs.kernels.steered_matrix import Matrix, assemble, factor, solve
 
@@ -23,6 +25,7 @@ class Steered(NamedTuple):
     momentum.
 
     stiffness : (4, n + 1), k times the stiffness of stretch, shear, torsion and bending. shift : (4,), advance along a ring.
+    slopes, values : (2, 3), those of `discs.chains.elements`, for degree 2.
     """
 
     weights: NDArray
@@ -32,6 +35,9 @@ class Steered(NamedTuple):
     shift: NDArray
     k: float
     ring: bool
+    degree: int
+    slopes: NDArray
+    values: NDArray
     load: Any
 
 
@@ -50,7 +56,7 @@ def parameters(
     padded[:, 1 : 1 + stiffness.shape[1]] = stiffness
     padded[:, 0] = padded[:, -1]
     paces = np.stack([given.radius / roots[0], 1 / roots[0], 1 / roots[1]])
-    return Steered(weights, paces, padded, scale, shift, given.k, ring, load)
+    return Steered(weights, paces, padded, scale, shift, given.k, ring, given.degree, SLOPES, VALUES, load)
 
 
 class Workspace(NamedTuple):
@@ -58,7 +64,7 @@ class Workspace(NamedTuple):
 
     Of the base position: base (4, n + 1), differences of neighbours; angles (4, n + 1), cosine and sine of headings and of the mean
     headings of links; strain (4, n + 1). Of a moved position or a step, see `discs.chains.steered`: links, along, tension
-    (4, n + 1), across (2, n + 1), couple (n + 1,).
+    (4, n + 1), across (2, n + 1), couple (n + 1,). joined (3, 6), see `discs.kernels.steered_elements`.
     """
 
     base: NDArray
@@ -74,6 +80,7 @@ class Workspace(NamedTuple):
     step: NDArray
     rhs: NDArray
     matrix: Matrix
+    joined: NDArray
 
 
 @fill(do.workspace, Steered, _nrt=True)
@@ -81,22 +88,24 @@ def _workspace(chain):
     n = chain.weights.shape[1]
     base, angles, strain = np.zeros((4, n + 1)), np.zeros((4, n + 1)), np.zeros((4, n + 1))
     links, turned, along, tension = np.zeros((4, n + 1)), np.zeros((2, n + 1)), np.zeros((2, n + 1)), np.zeros((4, n + 1))
-    matrix = Matrix(np.empty((3, n)), np.empty((4, n)), np.empty((2, 2, n)), np.empty(11))
+    far = n // 2 if chain.degree == 2 else 0
+    matrix = Matrix(np.empty((3, n)), np.empty((4, n)), np.empty((4, far)), np.empty((2, 2, n)), np.empty(11))
     across, couple = np.zeros((2, n + 1)), np.zeros(n + 1)
     c, step, rhs = np.empty((4, n)), np.empty((4, n)), np.empty((2, n))
-    return Workspace(base, angles, strain, links, turned, along, tension, across, couple, c, step, rhs, matrix)
+    return Workspace(base, angles, strain, links, turned, along, tension, across, couple, c, step, rhs, matrix, np.empty((3, 6)))
 
 
 @fill(do.factors, Steered, _nrt=True)
 def _factors(chain, g, count):
     n, kind = chain.weights.shape[1], np.array([g]).dtype
-    d, o, columns = np.empty((count, 3, n), kind), np.empty((count, 4, n), kind), np.empty((count, 2, 2, n), kind)
-    return Matrix(d, o, columns, np.empty((count, 11), kind))
+    far = n // 2 if chain.degree == 2 else 0
+    d, o, beyond = np.empty((count, 3, n), kind), np.empty((count, 4, n), kind), np.empty((count, 4, far), kind)
+    return Matrix(d, o, beyond, np.empty((count, 2, 2, n), kind), np.empty((count, 11), kind))
 
 
 @fill(do.pick, Steered)
 def _pick(chain, m, j):
-    return Matrix(m.d[j], m.o[j], m.columns[j], m.edge[j])
+    return Matrix(m.d[j], m.o[j], m.far[j], m.columns[j], m.edge[j])
 
 
 @fill(do.settle, Steered)
@@ -122,6 +131,8 @@ def _settle(chain, work, hi, lo):
     if chain.ring:
         middle[n] = 0.5 * (phi[0] + chain.shift[3] + phi[n - 1])
         middle[0] = middle[n]
+    if chain.degree == 2:
+        to_points(chain, work.base, middle, 1, n + 1)
     for j in range(n + 1):
         mid_cos[j], mid_sin[j] = turn(middle[j])
     strains(chain, work.base, mid_cos, mid_sin, work.strain)
@@ -178,7 +189,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
             b[row, i] = pi[row, i] - p[row, i] - half * b[row, i]
     do.push(chain.load, state, t + half, work.step, c, p, half, b)
     if first:  # later sweeps of a step use the same matrix, see `discs.integrators.midpoint`
-        assemble(chain, work, c, 1.0, half * half, m.d, m.o)
+        assemble(chain, work, c, 1.0, half * half, m)
         do.guide(chain.load, c, half, half * half, m.d[0], m.o[0], m.d[2], m.o[3])
         factor(chain, m)
     solve(chain, m, b)
@@ -192,7 +203,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
 def _stiffness(chain, work, move, c, matrix):
     spread(chain, work, move, 0, work.couple.size)
     secant(work, 0, work.couple.size, chain.k, False)
-    assemble(chain, work, c, 0.0, 1.0, matrix.d, matrix.o)
+    assemble(chain, work, c, 0.0, 1.0, matrix)
 
 
 @fill(do.precondition, Steered)
@@ -203,6 +214,8 @@ def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
     for row in range(4):
         for i in range(n):
             matrix.o[row, i] = g * stiff.o[row, i]
+        for i in range(stiff.far.shape[1]):
+            matrix.far[row, i] = g * stiff.far[row, i]
     do.guide(chain.load, c, d, g, matrix.d[0], matrix.o[0], matrix.d[2], matrix.o[3])
     factor(chain, matrix)
 

@@ -7,6 +7,7 @@ the change: two pairs for each disc and sweep.
 import math
 
 from discs.kernels.compiled import part
+from discs.kernels.steered_elements import to_links, to_points
 
 TILE = 128
 
@@ -59,7 +60,10 @@ def strains(chain, d, cos, sin, strain):
 
 @part
 def spread(chain, work, y, a, b):
-    """Differences of neighbours of y (4, n), and means of its headings, at links a to b: into `links` and `couple`."""
+    """Differences of neighbours of y (4, n), and means of its headings, at links a to b: into `links` and `couple`.
+
+    For elements those at their strain points.
+    """
     n, first, last = y.shape[1], max(a, 1), min(b, y.shape[1])
     for row in range(4):
         before, after, d = y[row][first - 1 : last - 1], y[row][first:last], work.links[row][first:last]
@@ -73,6 +77,8 @@ def spread(chain, work, y, a, b):
             for row in range(4):
                 work.links[row, j] = y[row, 0] - y[row, n - 1]
             work.couple[j] = 0.5 * (y[3, 0] + y[3, n - 1])
+    if chain.degree == 2:
+        to_points(chain, work.links, work.couple, a, b)
 
 
 @part
@@ -151,11 +157,17 @@ def tensions(work, stiffness, a, b, k):
 def pull(chain, work, y, full):
     """Geometry and tensions after a step or a move y, TILE links at a time, so that intermediate results stay in the cache."""
     links = work.couple.size
-    for a in range(0, links, TILE):
+    for a in range(chain.degree - 1, links, TILE):  # tiles of whole elements
         b = min(a + TILE, links)
         spread(chain, work, y, a, b)
         secant(work, a, b, chain.k, full)
         tensions(work, chain.stiffness, a, b, chain.k)
+        if chain.degree == 2:
+            to_links(chain, work.tension, work.couple, a, b)
+    if chain.degree == 2:  # link 0 is the last one, on a ring and, without stiffness, at free ends
+        work.couple[0] = work.couple[links - 1]
+        for row in range(4):
+            work.tension[row, 0] = work.tension[row, links - 1]
 
 
 @part

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from numpy.typing import NDArray
 
 from discs.kernels import blocks
+from discs.kernels import steered_elements as elements
 from discs.kernels.banded import reciprocal
 from discs.kernels.compiled import part
 
@@ -12,19 +13,24 @@ from discs.kernels.compiled import part
 class Matrix(NamedTuple):
     """A factored matrix: `blocks`, and on a ring the columns of the last disc, which border the others.
 
+    far : (4, elements), blocks of the first and last discs of elements (`steered_elements`); none for links.
     columns : (2, 2, n), solutions for the border. edge : (11,), two blocks of the border and the inverse of its Schur complement.
     """
 
     d: NDArray
     o: NDArray
+    far: NDArray
     columns: NDArray
     edge: NDArray
 
 
 @part
-def assemble(chain, work, c, one, g, d, o):
+def assemble(chain, work, c, one, g, m):
     """Entries of `one` I + g C^T B^T (stiffness) B C for the mean geometry in `work`."""
-    n = c.shape[1]
+    if chain.degree == 2:
+        elements.assemble_elements(chain, work, c, one, g, m)
+        return
+    n, d, o = c.shape[1], m.d, m.o
     per = 1 / chain.k
     cx, cy, ct, cp = c[0], c[1], c[2], c[3]
     along_x, along_y, across_x, across_y = work.along[0], work.along[1], work.across[0], work.across[1]
@@ -75,14 +81,14 @@ def couple(i, j, c, g, per, stiffness, along, across, o):
 
 
 @part
-def border(m):
+def border(d, o, columns, edge):
     """Factor the matrix of a ring: the chain without its last disc, then the border of that disc."""
-    last = m.d.shape[1] - 1
-    e, first, second = m.edge, m.columns[0, :, :last], m.columns[1, :, :last]
+    last = d.shape[1] - 1
+    e, first, second = edge, columns[0, :, :last], columns[1, :, :last]
     for i in range(4):
-        e[i] = m.o[i, last]  # last disc (rows) with disc 0
-        e[4 + i] = m.o[i, last - 1]  # disc last - 1 (rows) with the last
-    blocks.factor(m.d[:, :last], m.o[:, :last])
+        e[i] = o[i, last]  # last disc (rows) with disc 0
+        e[4 + i] = o[i, last - 1]  # disc last - 1 (rows) with the last
+    blocks.factor(d[:, :last], o[:, :last])
     first[:], second[:] = 0, 0
     first[0, 0] += e[0]
     first[1, 0] += e[1]
@@ -92,11 +98,11 @@ def border(m):
     first[1, last - 1] += e[6]
     second[0, last - 1] += e[5]
     second[1, last - 1] += e[7]
-    blocks.substitute(m.d[:, :last], m.o[:, :last], first)
-    blocks.substitute(m.d[:, :last], m.o[:, :last], second)
-    x = m.d[0, last] - across_border(e, 0, first)
-    y = m.d[1, last] - across_border(e, 0, second)
-    z = m.d[2, last] - across_border(e, 1, second)
+    blocks.substitute(d[:, :last], o[:, :last], first)
+    blocks.substitute(d[:, :last], o[:, :last], second)
+    x = d[0, last] - across_border(e, 0, first)
+    y = d[1, last] - across_border(e, 0, second)
+    z = d[2, last] - across_border(e, 1, second)
     det = reciprocal(x * z - y * y)
     e[8], e[9], e[10] = z * det, -y * det, x * det
 
@@ -109,24 +115,51 @@ def across_border(e, row, b):
 
 
 @part
-def factor(chain, m):
-    if chain.ring:
-        border(m)
-    else:
-        blocks.factor(m.d, m.o)
-
-
-@part
-def solve(chain, m, b):
-    if not chain.ring:
-        blocks.substitute(m.d, m.o, b)
-        return
-    last, e = b.shape[1] - 1, m.edge
+def solve_border(d, o, columns, e, b):
+    """Solve with the factors of `border`, b (2, n) in place."""
+    last = b.shape[1] - 1
     inner = b[:, :last]
-    blocks.substitute(m.d[:, :last], m.o[:, :last], inner)
+    blocks.substitute(d[:, :last], o[:, :last], inner)
     x, y = b[0, last] - across_border(e, 0, inner), b[1, last] - across_border(e, 1, inner)
     x, y = e[8] * x + e[9] * y, e[9] * x + e[10] * y
     for row in range(2):
         for i in range(last):
-            b[row, i] -= m.columns[0, row, i] * x + m.columns[1, row, i] * y
+            b[row, i] -= columns[0, row, i] * x + columns[1, row, i] * y
     b[0, last], b[1, last] = x, y
+
+
+@part
+def coupled(chain, m):
+    """The diagonal of the discs that are not condensed, and the blocks that couple them."""
+    o = m.far[:, ::1] if chain.degree == 2 else m.o[:, ::1]
+    return m.d[:, :: chain.degree], o
+
+
+@part
+def factor(chain, m):
+    if chain.degree == 1 and not chain.ring:
+        blocks.factor(m.d, m.o)
+        return
+    if chain.degree == 2:
+        elements.condense(m)
+    d, o = coupled(chain, m)
+    if chain.ring:
+        border(d, o, m.columns, m.edge)
+    else:
+        blocks.factor(d, o)
+
+
+@part
+def solve(chain, m, b):
+    if chain.degree == 1 and not chain.ring:
+        blocks.substitute(m.d, m.o, b)
+        return
+    if chain.degree == 2:
+        elements.reduce(m, b)
+    d, o = coupled(chain, m)
+    if chain.ring:
+        solve_border(d, o, m.columns, m.edge, b[:, :: chain.degree])
+    else:
+        blocks.substitute(d, o, b[:, ::2])
+    if chain.degree == 2:
+        elements.expand(m, b)

@@ -1,13 +1,17 @@
 """N discs converge to the field: the measured orders on the paper's scene."""
 
 import csv
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from compare import convergence, lump
 from compare.results import write_csv
-from continuum import breathing_ring, solve, untwisting_rod
+from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
+from discs import Gauss8, simulate
+from discs.loads import Damping, Rest, Slope
 
 pytestmark = pytest.mark.slow
 
@@ -33,6 +37,44 @@ def test_time_error_is_far_below_the_differences(paper_field):
     a = convergence(scene, (129,), "consistent", field=paper_field, progress=False)
     b = convergence(scene, (129,), "consistent", field=paper_field, dt=a.dt / 2, progress=False)
     assert np.abs(a.error - b.error).max() < 1e-3 * a.error.min()
+
+
+def test_elements_converge_at_order_four(tmp_path):
+    scene = steered_rod()
+    field = solve(scene, 1e-9, frames=1, progress=False)
+    studies = [convergence(scene, (33, 65, 129), field=field, progress=False, degree=degree) for degree in (1, 2)]
+    assert studies[1].order == pytest.approx(3.95, abs=0.07), studies[1].table()
+    assert studies[1].error[-1].max() < 5e-7
+    links, elements = (study.reaching(1e-6) for study in studies)
+    assert 1100 < links < 1250
+    assert 100 < elements < 115
+    studies[0].plot(tmp_path / "orders.png", studies[1])
+    assert (tmp_path / "orders.png").stat().st_size > 10_000
+
+
+def test_elements_of_varying_loaded_rods_and_of_rings_have_order_four():
+    """By what twice as many discs change. (A density with a slope at an end would make the initial twist rough there.)"""
+    q = np.pi / 4
+    varying = {
+        "density": lambda s: 1 + 0.3 * np.cos(2 * q * s),
+        "shear_stiffness": lambda s: 9 + 3 * np.cos(q * s),
+        "torsion_stiffness": lambda s: 0.8 + 0.2 * np.cos(q * s),
+        "radius": lambda s: 1 + 0.2 * np.cos(q * s),
+    }
+    loads = Rest(curvature=lambda s: 0.3 * np.sin(q * s), signal=lambda t: (t / 2) ** 6), Damping(rolling=0.1), Slope(0.2, 0.1)
+
+    def circle(s):
+        return np.sin(s), 1 - np.cos(s), 0.4 * np.sin(s), 0.5 + 0.2 * np.cos(s), s, 0 * s
+
+    around = replace(steered_rod().rod, length=2 * np.pi)
+    ring = Scene(rod=around, initial=circle, duration=1.0, rolling="unit", closed=True, turns=1)
+    method = Gauss8(tolerance=1e-13)
+    rod = replace(steered_rod(duration=2.0, **varying), loads=loads)
+    for scene, sizes, back in ((rod, (65, 129, 257), 1), (ring, (32, 64, 128, 256), 2)):  # around a ring orders go up and down
+        runs = [simulate(lump(scene, n, degree=2), method, scene.duration / 150, frames=1, progress=False) for n in sizes]
+        for name in ("x", "y", "theta", "phi"):
+            changes = [np.abs(a - b[::2]).max() for a, b in pairwise(getattr(run, name)[-1] for run in runs)]
+            assert np.log2(changes[0] / changes[-1]) / back == pytest.approx(3.95, abs=0.2), (name, changes)
 
 
 def test_rings_need_no_ends(rolling, tmp_path):
