@@ -77,8 +77,8 @@ def solve(
         step of the spectral field are evaluated on its collocation polynomial.
     progress : show progress on anything that takes over a second.
     want : further quantities (docs/ground-force.md): "velocity", "slope", and, of "spectral" and "elements", "contact_force" (per
-        length, with end_force and end_couple at free ends), "energy_density" and "energy_flux". `tol` may bind their arrays, too:
-        {"theta": 1e-5, "end_couple": 1e-3}.
+        length, with end_force and end_couple at free ends, and contact_moments), "energy_density" and "energy_flux". `tol` may
+        bind their arrays, too: {"theta": 1e-5, "end_couple": 1e-3}.
 
     Returns
     -------

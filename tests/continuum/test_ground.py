@@ -261,3 +261,27 @@ def test_saved(tmp_path):
         np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
     assert again.error_estimate == found.error_estimate
     assert found[1:].end_force.shape == (2, 2, 2)
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_tolerances_bind_wanted_quantities(own):
+    make = steered_rod if own else untwisting_rod
+    scene, name = make(duration=1.0, **ROD), "end_force"
+    truth = field(scene, 1e-8, "contact_force", frames=3)
+    found = field(scene, {name: 2e-4}, "contact_force", frames=3)
+    assert np.abs(getattr(found, name) - getattr(truth, name)).max() < found.error_estimate[name] <= 2e-4
+    assert np.abs(getattr(truth, name)).max() > 0.05
+
+
+@pytest.mark.slow
+def test_velocities_and_slopes_of_meshes_and_of_the_papers_scheme():
+    scene, want = untwisting_rod("unit", duration=1.0, **ROD), ("velocity", "slope")
+    truth = field(scene, 1e-8, want, frames=3)
+    found = field(scene, 1e-3, want, method="richardson", frames=3)
+    every = (truth.s.size - 1) // (found.s.size - 1)
+    for name in ("x_rate", "y_rate", "slope_x", "slope_y"):
+        error = np.abs(getattr(found, name) - getattr(truth, name)[:, ::every]).max()
+        assert error < found.error_estimate[name] < 5 * error
+    coarse = field(scene, want=want, method="leapfrog", frames=3)
+    assert np.abs(coarse.y_rate[:, [0, -1]] - truth.y_rate[:, [0, -1]]).max() < 0.1
+    assert coarse.contact_force is None
