@@ -43,7 +43,11 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--n", metavar="N", type=int, nargs="+", default=list(SIZES), help="numbers of discs (default: 17 ... 513)")
     p.add_argument(
-        "--tol", metavar="TOL", type=float, default=1e-5, help="largest error of the field, length and rad (default: 1e-5)"
+        "--tol",
+        metavar="TOL",
+        type=float,
+        default=1e-7,
+        help="largest error of the field, length and rad (default: 1e-7, for the ground's force)",
     )
     p.add_argument("--no-limits", action="store_true", help="skip the discs with own headings (default scene only)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
@@ -237,7 +241,9 @@ def run_main_job(options: argparse.Namespace) -> None:
     with background() as executor:
         studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor)
         print(summary(studies))
-        print(f"\nwritten to {options.out}: convergence.csv, convergence.png, motion.png, energy.png\n", flush=True)
+        print(
+            f"\nwritten to {options.out}: convergence.csv, convergence.png, limits-of-all.png, motion.png, energy.png\n", flush=True
+        )
         if not options.scene and not options.no_limits:
             print(limits(options.out, not options.quiet, executor=executor))
             print(f"\nwritten to {options.out}: headings.csv, limits.csv, locking.csv, limits.png")

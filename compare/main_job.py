@@ -3,6 +3,7 @@
 import warnings
 from concurrent.futures import Executor, Future, wait
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -10,6 +11,7 @@ from tqdm import tqdm
 
 from compare.lump import lump
 from compare.outputs import fresh_files
+from compare.quantities import offered
 from compare.results import Study, format_table, write_csv
 from compare.study import checked_sizes, convergence
 from continuum import Scene, solve
@@ -25,13 +27,14 @@ def overview(
     scene: Scene,
     out: str | Path,
     n: tuple[int, ...] = SIZES,
-    tol: float = 1e-5,
+    tol: float = 1e-7,
     progress: bool = True,
     executor: Executor | None = None,
 ) -> list[Study]:
     """Compare a scene's discs with its field; write the table and the pictures to `out`.
 
-    Writes convergence.csv, convergence.png, motion.png and energy.png. The energy is shown over 33 times the scene's duration,
+    Writes convergence.csv, convergence.png, limits-of-all.png (velocities, slopes, energy and the ground's force), motion.png and
+    energy.png. The energy is shown over 33 times the scene's duration,
     [0, 150] for the paper's, and over the duration itself for a closed rod (under the unit law a ring collapses).
 
     Parameters
@@ -51,12 +54,15 @@ def overview(
     long = scene if scene.closed else replace(scene, duration=LONG * scene.duration)
     with fresh_files(out) as folder:
         energies = executor.submit(energy_runs, long) if executor else None
-        field = solve(scene, tol, frames=INSTANTS, progress=progress)
-        beside = [executor.submit(convergence, scene, n, kinds[0], field, progress=False)] if executor and len(kinds) > 1 else []
-        here = [convergence(scene, n, ends, field, progress=progress) for ends in kinds[len(beside) :]]
+        want = offered(scene)
+        field = solve(scene, tol, frames=INSTANTS, progress=progress, want=want)
+        study = partial(convergence, scene, n, field=field, want=want)
+        beside = [executor.submit(study, ends=kinds[0], progress=False)] if executor and len(kinds) > 1 else []
+        here = [study(ends=ends, progress=progress) for ends in kinds[len(beside) :]]
         studies = [_awaited(future, "discs, plain ends", progress) for future in beside] + here
         write_csv(folder / "convergence.csv", studies)
         studies[0].plot(folder / "convergence.png", *studies[1:])
+        figures.save(figures.limits_of_all(studies)[0], folder / "limits-of-all.png")
         figures.motion(field, scene).savefig(folder / "motion.png", dpi=150)
         ax = figures.energy(
             _awaited(energies, "energy over a long time", progress) if energies else energy_runs(long, progress=progress)
@@ -97,5 +103,7 @@ def summary(studies: list[Study]) -> str:
     table = format_table([studies[0].columns, *(row for study in studies for row in study.rows())])
     return (
         f"{scene.name}, {scene.rolling} law, t = {scene.duration:g}: largest error over the discs "
-        f"against the field (estimated error {floor:.1e})\n{table}"
+        f"against the field (estimated error {floor:.1e})\n{table}\n\n"
+        "Velocity and slope; then energy and ground's force, relative to the field's largest value (inside: an eighth of the\n"
+        "length or more away from free ends)\n" + "\n\n".join(study.wants_table() for study in studies)
     )

@@ -27,9 +27,11 @@ class Study:
     ends : kind of ends of the chains; "elements" for degree 2.
     n : (S,), numbers of discs.
     k : (S,), spacings, length.
-    error : (S, fields), largest error over the discs of x, y (length), theta and, for own headings, phi (rad).
-    floor : estimated error of the field itself, the largest over the fields.
+    error : (S, fields), largest error over the discs of x, y (length), theta and, for own headings, phi (rad); then those of wanted
+        quantities, see `compare.quantities`.
+    floor : estimated error of the field itself, the largest over positions and angles.
     dt : time step of the chains.
+    names : wanted quantities. floors : estimated errors of the field for them; NaN where it has none.
     """
 
     scene: Scene
@@ -39,16 +41,18 @@ class Study:
     error: Float
     floor: float
     dt: float
+    names: tuple[str, ...] = ()
+    floors: tuple[float, ...] = ()
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Names of the fields compared."""
-        return compared(self.scene)
+        """Names of the quantities compared."""
+        return (*compared(self.scene), *self.names)
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Heading of the table."""
-        return ("ends", "N", "k", *(f"error {f}" for f in self.fields), *(f"order {f}" for f in self.fields))
+        """Heading of the table of positions and angles."""
+        return _columns(compared(self.scene))
 
     @property
     def order(self) -> Float:
@@ -57,22 +61,39 @@ class Study:
             return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
 
     def reaching(self, error: float) -> int:
-        """The number of discs at which all errors fall to this one, by the power law through the last two rows."""
-        worst = self.error.max(axis=1)[-2:]
+        """The number of discs at which the errors of positions and angles fall to this one, by the power law through the last two rows."""
+        worst = self.error[-2:, : len(compared(self.scene))].max(axis=1)
         order = np.log(worst[0] / worst[1]) / np.log(self.k[-2] / self.k[-1])
         return int(np.ceil(self.scene.rod.length / (self.k[-1] * (error / worst[1]) ** (1 / order)))) + (self.ends != "ring")
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table as text, a row for each n."""
-        orders = [("",) * len(self.fields)] + [tuple(f"{o:.2f}" if np.isfinite(o) else "-" for o in row) for row in self.order]
+    def rows(self, every: bool = False) -> list[tuple[str, ...]]:
+        """The table of positions and angles as text, a row for each n; with `every` that of wanted quantities, too."""
+        count = len(self.fields) if every else len(compared(self.scene))
+        orders = [("",) * count] + [tuple(f"{o:.2f}" if np.isfinite(o) else "-" for o in row) for row in self.order[:, :count]]
         return [
-            (self.ends, str(n), f"{k:.6f}", *(f"{e:.3e}" for e in error), *order)
+            (self.ends, str(n), f"{k:.6f}", *(f"{e:.3e}" for e in error[:count]), *order)
             for n, k, error, order in zip(self.n, self.k, self.error, orders, strict=True)
         ]
 
     def table(self) -> str:
-        """The table, aligned for a terminal."""
-        return format_table([self.columns, *self.rows()])
+        """The table, aligned for a terminal, and that of wanted quantities."""
+        text = format_table([self.columns, *self.rows()])
+        return f"{text}\n\n{self.wants_table()}" if self.names else text
+
+    def wants_table(self) -> str:
+        """The table of wanted quantities, a line for each: errors, the last order, the estimated error of the field."""
+        start = len(compared(self.scene))
+        last = self.order[-1] if len(self.n) > 1 else np.full(len(self.fields), np.nan)
+        rows = [
+            (
+                name,
+                *(f"{e:.2e}" for e in errors),
+                *(f"{o:.2f}" if np.isfinite(o) else "-" for o in (order,)),
+                f"{floor:.0e}".replace("nan", "-"),
+            )
+            for name, errors, order, floor in zip(self.names, self.error.T[start:], last[start:], self.floors, strict=True)
+        ]
+        return format_table([(self.ends, *(f"N = {n}" for n in self.n), "order", "field's"), *rows])
 
     def plot(self, path: str | Path | None = None, *others: "Study", ax: "Axes | None" = None) -> "Axes":
         """Error against n, with `others` in the same axes; saved if a path is given."""
@@ -84,6 +105,10 @@ class Study:
         return ax
 
 
+def _columns(fields: tuple[str, ...]) -> tuple[str, ...]:
+    return ("ends", "N", "k", *(f"error {f}" for f in fields), *(f"order {f}" for f in fields))
+
+
 def compared(scene: Scene) -> tuple[str, ...]:
     """Names of the fields of a scene that a study compares."""
     return ("x", "y", "theta", "phi") if scene.steered else ("x", "y", "theta")
@@ -92,7 +117,7 @@ def compared(scene: Scene) -> tuple[str, ...]:
 def write_csv(path: Path, studies: list[Study]) -> None:
     """The table of several studies as CSV."""
     with path.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([studies[0].columns, *(row for study in studies for row in study.rows())])
+        csv.writer(file).writerows([_columns(studies[0].fields), *(row for study in studies for row in study.rows(every=True))])
 
 
 def format_table(rows: list[tuple[str, ...]]) -> str:

@@ -1,10 +1,13 @@
 """N discs against the field, N -> infinity."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from compare.lump import lump
+from compare.quantities import Limit, check_want
 from compare.results import Study, compared
 from continuum import Scene, solve
 from continuum.mesh import viscous
@@ -23,6 +26,7 @@ def convergence(
     tol: float = 1e-5,
     progress: bool = True,
     degree: int = 1,
+    want: Iterable[str] = (),
 ) -> Study:
     """Simulate a scene with n = n_1, n_2, ... discs and compare with the field at the end.
 
@@ -32,12 +36,20 @@ def convergence(
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame must be at the end of the scene.
     dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
-    method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscous bending, "gauss8" for degree 2.
+    method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscous bending, "gauss8" for degree 2 and with
+        ground forces, in which waves that steps do not resolve are large.
     degree : see `lump`.
+    want : further quantities, "velocity", "slope", "energy_density", "contact_force"; see `compare.quantities`. A given field must
+        have them: `solve(scene, tol, want=want)`.
     """
     sizes, problems = checked_sizes(scene, n, ends, degree)
+    want = check_want(want, scene)
+    if degree == 2 and "energy_density" in want:
+        raise ValueError(
+            "want: the energy density of discs of order four is not compared; leave 'energy_density' out, or take degree=1"
+        )
     if field is None:
-        field = solve(scene, tol, frames=2, progress=progress)
+        field = solve(scene, tol, frames=2, progress=progress, want=want)
     if field.error_estimate is None or not np.isclose(field.t[-1], scene.duration, rtol=1e-12):
         raise ValueError(
             f"field must be solve(scene, tol) of this scene up to t = {scene.duration:g}, with an error estimate; got {field!r}"
@@ -45,16 +57,18 @@ def convergence(
     h = scene.duration / max(300, 8 * field.stats.get("steps", 0)) if dt is None else checks.number("dt", dt, positive=True)
     if method is None:
         composed = Gauss6(tolerance=1e-10) if viscous(scene) else Suzuki4(Midpoint(tolerance=1e-10))
-        method = Gauss8(tolerance=1e-13) if degree == 2 else composed
+        method = Gauss8(tolerance=1e-13) if degree == 2 or "contact_force" in want else composed
     fields = compared(scene)
-    error = np.empty((len(problems), len(fields)))
+    more = Limit(scene, field, want)
+    error = np.empty((len(problems), len(fields) + len(more.names)))
     bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
-        run = simulate(problem, method, h, frames=1, progress=progress and i == 0)  # the first may report that kernels are compiled
-        error[i] = apart(scene, run, field)
+        first = progress and i == 0  # which may report that kernels are compiled
+        run = simulate(problem, method, h, frames=1, want=more.of_discs, progress=first)
+        error[i] = *apart(scene, run, field), *more.errors(run)
     floor = max(field.error_estimate[name] for name in fields)
     k = np.array([problem.chain.k for problem in problems])
-    return Study(scene, "elements" if degree == 2 else problems[0].chain.ends, sizes, k, error, floor, h)
+    return Study(scene, "elements" if degree == 2 else problems[0].chain.ends, sizes, k, error, floor, h, more.names, more.floors)
 
 
 def apart(scene: Scene, run: Solution, field: Solution) -> Float:

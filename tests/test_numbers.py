@@ -75,7 +75,7 @@ NUMBERS = {
     "free duration": lambda v: free_rod(ROD, lambda s: (s, 0 * s), lambda s: (0 * s, 0 * s), 0, 0, v, 5, 0.1),
     "free dt": lambda v: free_rod(ROD, lambda s: (s, 0 * s), lambda s: (0 * s, 0 * s), 0, 0, 0.1, 5, v),
     "free omega0": lambda v: free_rod(ROD, lambda s: (s, 0 * s), lambda s: (0 * s, 0 * s), 0, v, 0.1, 5, 0.1),
-    "weight": lambda v: first_slip(FORCED, v, 1.0),
+    "weight": lambda v: first_slip(FORCED, v, 1.0, ends=True),
     **{f"knife_edge {name}": lambda v, name=name: knife_edge(**SKATE | {name: v}) for name in SKATE},
     "knife_edge heading": lambda v: knife_edge(**SKATE, heading=v),
     "sleigh heading": lambda v: chaplygin_sleigh(1.0, 1.0, 1.0, speed=1.0, turn_rate=1.0, heading=v),
@@ -107,7 +107,7 @@ ARRAYS = {
     "frames": lambda v: frame_times(v, 5.0),
     "omega0": lambda v: free_rod(ROD, lambda s: (s, 0 * s), lambda s: (0 * s, 0 * s), 0, v, 0.1, 5, 0.1, progress=False),
     "vector": lambda v: checks.vector("q", v, 5),
-    "mu": lambda v: first_slip(FORCED, 1.0, v),
+    "mu": lambda v: first_slip(FORCED, 1.0, v, ends=True),
 }
 FIVE = [0.5, 1.0, 1.5, 2.0, 2.5]
 

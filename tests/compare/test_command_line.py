@@ -13,7 +13,7 @@ from continuum import breathing_ring
 
 pytestmark = pytest.mark.slow
 
-FILES = ["convergence.csv", "convergence.png", "energy.png", "motion.png"]
+FILES = ["convergence.csv", "convergence.png", "energy.png", "limits-of-all.png", "motion.png"]
 
 
 def test_main_job(tmp_path, capsys, monkeypatch):

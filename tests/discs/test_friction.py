@@ -6,6 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from compare import lump
+from continuum import untwisting_rod
 from discs import Gauss8, Problem, State, SteeredChain, simulate
 from discs.integrators import METHODS, find
 from discs.mechanics.friction import first_slip, friction_needed
@@ -66,14 +68,14 @@ def test_friction_of_discs_in_circles():
     problem = free_discs()
     run = simulate(problem, dt=0.1, frames=5, want=("contact_force",), progress=False)
     weight = 9.81 * np.asarray(problem.chain.density) * problem.chain.w
-    needed = friction_needed(run, weight)
+    needed = friction_needed(run, weight).discs
     expected = np.array([0.7 * 1.1 * 0.8, 0.5 * 0.4 * 1.9]) / 9.81
     np.testing.assert_allclose(needed, np.broadcast_to(expected, (5, 2)), rtol=1e-13)
-    assert first_slip(run, weight, expected[0] * 1.001) is None
-    slip = first_slip(run, weight, expected[0] * 0.999)
+    assert first_slip(run, weight, expected[0] * 1.001, ends=True) is None
+    slip = first_slip(run, weight, expected[0] * 0.999, ends=True)
     assert (slip.disc, slip.time, slip.needed) == (0, 0.0, pytest.approx(expected[0]))
     # disc 1 needs less, but stands on ice
-    assert first_slip(run, weight, [1.0, 0.01]).disc == 1
+    assert first_slip(run, weight, [1.0, 0.01], ends=True).disc == 1
 
 
 @models([SLAVED[0], STEERED[1]])
@@ -83,7 +85,7 @@ def test_first_slip(model):
     weight = 9.81 * np.asarray(problem.chain.density) * problem.chain.w
 
     def needed(times):
-        return friction_needed(simulate(problem, "gauss4", 0.01, times, ("contact_force",), progress=False), weight)
+        return friction_needed(simulate(problem, "gauss4", 0.01, times, ("contact_force",), progress=False), weight).discs[:, 1:-1]
 
     mu = 0.9 * needed(np.linspace(0, 1, 401)).max()
     wrong = []
@@ -92,8 +94,8 @@ def test_first_slip(model):
         slip = first_slip(run, weight, mu)
         assert 0 < slip.time < 1
         assert slip.needed > mu
-        assert (friction_needed(run, weight)[run.t < slip.time] <= mu).all()
-        wrong.append(abs(needed([slip.time])[0, slip.disc] - mu))
+        assert (friction_needed(run, weight).inner[run.t < slip.time] <= mu).all()
+        wrong.append(abs(needed([slip.time])[0, slip.disc - 1] - mu))
     assert max(wrong) < 2e-3 * mu
     assert wrong[2] < 3e-4 * mu
 
@@ -103,9 +105,9 @@ def test_between_two_frames_the_earliest_disc_counts():
     run = simulate(free_discs(), dt=0.1, frames=[0.0, 2.0], want=("contact_force",), progress=False)
     force = np.zeros((2, 2, 2))
     force[:, 0, 0], force[:, 1, 1] = [0.0, -3.5], [0.0, 2.0]
-    slip = first_slip(replace(run, contact_force=force), [2.0, 1.0], 0.3)
+    slip = first_slip(replace(run, contact_force=force), [2.0, 1.0], 0.3, ends=True)
     assert (slip.disc, slip.time, slip.needed) == (1, pytest.approx(0.3), 2.0)
-    assert first_slip(replace(run, contact_force=force), [1.5, 1.0], 0.3).disc == 0
+    assert first_slip(replace(run, contact_force=force), [1.5, 1.0], 0.3, ends=True).disc == 0
 
 
 def test_bad_input_is_refused():
@@ -117,4 +119,26 @@ def test_bad_input_is_refused():
     with pytest.raises(ValueError, match=r"weight must be finite and greater than 0; got 0.0 at place 1"):
         friction_needed(run, [1.0, 0.0])
     with pytest.raises(ValueError, match=r"mu must be finite and greater than 0; got -0.3 at place 0"):
-        first_slip(run, 1.0, -0.3)
+        first_slip(run, 1.0, -0.3, ends=True)
+
+
+def test_inside_the_coefficient_converges_and_at_the_ends_force_and_couple_are_told():
+    """The paper's rod: 0.22 inside whatever N, while end discs need 109 and 507."""
+    inside, at_ends = [], []
+    for n in (65, 129):
+        problem = lump(untwisting_rod(), n, "consistent")
+        run = simulate(problem, "midpoint", 0.02, 201, ("contact_force",), progress=False)
+        weight = 9.81 * problem.chain.density * problem.chain.w
+        found = friction_needed(run, weight)
+        inside.append(found.inner.max())
+        at_ends.append(found.discs.max())
+        assert found.end_force.shape == found.end_couple.shape == (201, 2, 2)
+        assert "which grows with their number" in str(found)
+    assert inside == pytest.approx([0.22, 0.22], abs=0.01)
+    assert at_ends[1] > 4 * at_ends[0] > 400
+    within = first_slip(run, weight, 0.2)
+    assert 16 <= within.disc <= 112
+    with pytest.warns(UserWarning, match="is near a free end, where the coefficient depends on the number of discs"):
+        assert first_slip(run, weight, 0.2, ends=True).time < within.time
+    with pytest.raises(ValueError, match="none of 2 discs is an eighth of the length away from the free ends; take ends=True"):
+        first_slip(simulate(free_discs(), frames=2, want=("contact_force",), progress=False), 1.0, 0.3)

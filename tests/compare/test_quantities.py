@@ -1,0 +1,94 @@
+"""Velocities, slopes, energy and the ground's force of discs against the field: orders, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compare import convergence, lump
+from compare.quantities import WANTS, energy_density
+from continuum import breathing_ring, solve, steered_rod, untwisting_rod
+from discs import simulate
+from discs.loads import Rest, Torque
+from discs.mechanics.ground import end_forces
+
+OF_THE_GROUND = "force inside", "force weak", "end force", "end couple"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["field", pytest.param("unit", marks=pytest.mark.long)])
+def test_with_consistent_ends_everything_converges_at_second_order(law):
+    """Measured from 257 to 513 discs: 2.0 to 2.3, field law, and 2.0 to 2.4, unit law."""
+    study = convergence(untwisting_rod(law), (257, 513), "consistent", tol=1e-7, want=WANTS, progress=False)
+    assert study.names == ("velocity", "slope", "energy inside", *OF_THE_GROUND)
+    if law == "unit":  # the force inside is that of waves: its order shows with more discs
+        study = replace(study, error=np.delete(study.error, study.fields.index("force inside"), axis=1))
+    assert (study.order > 1.9).all(), study.table()
+    assert (study.order < 2.45).all(), study.table()
+    assert study.error[-1].max() < 2e-3
+    assert np.nanmax(study.floors) < 1e-5
+
+
+@pytest.mark.slow
+def test_with_plain_ends_everything_converges_at_first_order():
+    study = convergence(untwisting_rod(), (257, 513), "springs", tol=1e-7, want=WANTS, progress=False)
+    assert (abs(study.order - 1) < 0.3).all(), study.table()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", [steered_rod(radius=0.7, density=1.3, duration=2.0), breathing_ring(radius=0.7, density=1.3)])
+def test_own_headings_and_rings_converge_at_second_order(scene):
+    n = (32, 64, 128) if scene.closed else (33, 65, 129)
+    study = convergence(scene, n, tol=1e-7, want=WANTS, progress=False)
+    ends = () if scene.closed else ("end force",)
+    assert study.names == ("velocity", "slope", "energy inside", "force inside", "force weak", *ends)
+    assert study.order[-1] == pytest.approx(2.0, abs=0.15), study.table()
+
+
+def test_energy_density_adds_up():
+    """On a ring the sum over the discs is their energy, up to the mean of the springs beside a disc."""
+    scene = breathing_ring(radius=0.7, density=1.3)
+    run = simulate(lump(scene, 128), "midpoint", 0.01, 1, ("velocity",), progress=False)
+    assert energy_density(scene, run).sum() * run.problem.chain.k == pytest.approx(run.energy[-1], rel=2e-3)
+
+
+@pytest.fixture(scope="module")
+def forced():
+    """The paper's rod with consistent ends, 257 discs, at t = 2."""
+    scene = untwisting_rod(duration=2.0)
+    run = simulate(lump(scene, 257, "consistent"), "gauss6", 0.01, 2, ("contact_force",), progress=False)
+    return run, solve(scene, 1e-6, frames=2, want="contact_force", progress=False)
+
+
+@pytest.mark.slow
+def test_force_and_couple_at_the_ends_from_discs_alone(forced):
+    run, field = forced
+    found = end_forces(run)
+    np.testing.assert_allclose(found.couple[-1], field.end_couple[-1], atol=0.03 * abs(field.end_couple[-1]).max())
+    np.testing.assert_allclose(found.force[-1], field.end_force[-1], atol=0.1 * abs(field.end_force[-1]).max())
+
+
+def test_what_is_not_compared_is_refused():
+    scene = untwisting_rod()
+    with pytest.raises(ValueError, match="want must be one of 'velocity'"):
+        convergence(scene, (9, 17), want=("speed",))
+    with pytest.raises(ValueError, match="want: of this scene velocity, slope are compared; got contact_force"):
+        convergence(untwisting_rod("unit", curvature="true"), (9, 17), want="contact_force")
+    with pytest.raises(ValueError, match="velocity, slope, energy_density are compared; got contact_force"):
+        convergence(replace(scene, loads=(Torque(0.1, at=2.0),)), (9, 17), want="contact_force")
+    with pytest.raises(ValueError, match="velocity, slope, contact_force are compared; got energy_density"):
+        convergence(replace(scene, loads=(Rest(twist=0.1),)), (9, 17), want="energy_density")
+    field = solve(scene, 1e-2, frames=2, progress=False)
+    with pytest.raises(ValueError, match=r"field has no slope; give solve\(scene, tol, want=\('slope',\)\)"):
+        convergence(scene, (9, 17), field=field, want="slope", progress=False)
+
+
+def test_end_forces_of_what_has_none_are_refused():
+    ring = simulate(lump(breathing_ring(), 40), "midpoint", 0.1, 1, ("contact_force",), progress=False)
+    with pytest.raises(ValueError, match="a ring has none"):
+        end_forces(ring)
+    few = simulate(lump(untwisting_rod(), 17), "midpoint", 0.1, 1, ("contact_force",), progress=False)
+    with pytest.raises(ValueError, match="need at least 35 discs; got 17"):
+        end_forces(few)
+    with pytest.raises(ValueError, match=r"simulate with want=\(\"contact_force\",\)"):
+        end_forces(replace(few, contact_force=None))
