@@ -75,13 +75,13 @@ def end_forces(run: Solution, inside: Float | None = None) -> EndForces:
 
 
 def inner(run: Solution) -> NDArray[np.bool_]:
-    """Which discs are away from free ends by more than an eighth of the length, (n,) of booleans; all of a ring."""
+    """Which discs are away from free ends by an eighth of the length or more, (n,) of booleans; all of a ring."""
     chain = None if run.problem is None else run.problem.chain
     if chain is None:
         raise ValueError("a run of discs is needed; got a field, whose contact_force is the force per length inside it")
     if chain.ends == "ring":
         return np.ones(chain.n, dtype=bool)
-    away: NDArray[np.bool_] = np.minimum(chain.s, chain.length - chain.s) > SHARE * chain.length
+    away: NDArray[np.bool_] = np.minimum(chain.s, chain.length - chain.s) > (SHARE - 1e-9) * chain.length
     return away
 
 
