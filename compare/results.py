@@ -61,7 +61,7 @@ class Study:
             return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
 
     def reaching(self, error: float) -> int:
-        """The number of discs at which the errors of positions and angles fall to this one, by the power law through the last two rows."""
+        """The number of discs at which positions and angles have this error, by the power law through the last two rows."""
         worst = self.error[-2:, : len(compared(self.scene))].max(axis=1)
         order = np.log(worst[0] / worst[1]) / np.log(self.k[-2] / self.k[-1])
         return int(np.ceil(self.scene.rod.length / (self.k[-1] * (error / worst[1]) ** (1 / order)))) + (self.ends != "ring")
