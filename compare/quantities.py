@@ -84,7 +84,7 @@ class Limit:
         if "contact_force" in want:
             floors["force inside"] = np.nan  # the field's estimate is that near its ends
             for name, array in (("force weak", "contact_moments"), ("end force", "end_force"), ("end couple", "end_couple")):
-                if (found := getattr(field, array)) is not None and found.any():
+                if (found := getattr(field, array)) is not None and not (name == "end couple" and scene.steered):
                     self._values[name] = found[-1]
                     floors[name] = estimate[array] / _size(found[-1])
         self._splines = {name: spline(scene, field.s, self._values[name]) for name in want}
