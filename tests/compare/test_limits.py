@@ -1,6 +1,7 @@
 """Limits of discs with own headings: the files, and the rates in them."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
@@ -28,6 +29,9 @@ def test_they_write_their_files(written):
     folder, text = written
     assert sorted(p.name for p in folder.iterdir()) == ["headings.csv", "limits.csv", "limits.png", "locking.csv"]
     assert UNIT in text
+    links, elements = ([row for row in text.splitlines() if re.match(rf" +{order}  +\d+ ", row)] for order in (2, 4))
+    assert float(links[-1].split()[2]) <= 1.1e-6
+    assert 4 * int(elements[-1].split()[1]) < int(links[-1].split()[1])
 
 
 def test_they_tend_to_the_unit_law_with_true_curvature(written):
