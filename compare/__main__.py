@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from compare import load_limits, precision, report
+from compare import load_limits, precision, report, slip
 from compare.background import background
 from compare.hardcases.table import Stability, kept, stability
 from compare.limits import limits
@@ -61,6 +61,7 @@ def parser() -> argparse.ArgumentParser:
         commands.add_parser("trust", help="random scenes: whether errors stay below the tolerances", description=about(trust))
     )
     add_loads(commands.add_parser("loads", help="N to infinity under loads", description=about(load_limits)))
+    add_slip(commands.add_parser("slip", help="discs that slide: which limit first?", description=about(slip)))
     add_report(commands.add_parser("report", help="everything on one page", description=about(report)))
     return p
 
@@ -108,6 +109,23 @@ def write_trust(found: Trust, out: str) -> None:
     with fresh_files(out) as folder:
         found.save(folder / "trust.csv")
         (folder / "trust.md").write_text(f"# Random scenes\n\n{found.summary()}\n\n{found.table()}\n", encoding="utf-8")
+
+
+def add_slip(p: argparse.ArgumentParser) -> None:
+    """The options of `slip`."""
+    p.add_argument("--out", metavar="DIR", default="out", help="folder for slip.csv and slip.png (default: out)")
+    p.add_argument("--n", metavar="N", type=int, nargs="+", default=list(slip.SIZES), help="numbers of discs (default: 9 ... 257)")
+    p.add_argument(
+        "--slips", metavar="EPSILON", type=float, nargs="+", default=list(slip.SLIPS), help="slips (default: 1e-1 ... 1e-6)"
+    )
+    p.add_argument("--quiet", action="store_true", help="no progress bars")
+    p.set_defaults(run=run_slip)
+
+
+def run_slip(options: argparse.Namespace) -> None:
+    """Compare discs that slide with discs that roll."""
+    print(slip.slip_limits(options.out, not options.quiet, tuple(options.n), tuple(options.slips))[0])
+    print(f"\nwritten to {options.out}: slip.csv, slip.png")
 
 
 def add_loads(p: argparse.ArgumentParser) -> None:

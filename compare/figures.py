@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from compare.results import Growth, Study, WorkPrecision, compared
+from compare.slip import Slips
 from continuum import Scene
 from discs import Solution
 from discs.arrays import Float
@@ -108,6 +110,37 @@ def limits_of_all(studies: Sequence[Study]) -> list[Axes]:
     figure.suptitle(f"Not only the positions converge: {scene.name}, {scene.rolling} law, t = {scene.duration:g}")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=9)
     return axes
+
+
+def slip(found: Sequence[Slips]) -> list[Axes]:
+    """Distance of sliding discs from rolling ones of the same N, and their slip, against epsilon; a row for each scene."""
+    figure = Figure(figsize=(10.5, 4.4 * len(found)), layout="constrained")
+    axes = figure.subplots(len(found), 2, squeeze=False)
+    for (far, at_ends), each in zip(axes, found, strict=True):
+        ring = each.scene.closed
+        for i, n in enumerate(each.n):
+            colour = colormaps["viridis"](0.9 * i / max(1, len(each.n) - 1))
+            far.loglog(each.epsilon, each.rolling[i], marker="o", markersize=4, color=colour, label=f"N = {n}")
+            at_ends.loglog(each.epsilon, each.end[i], marker="o", markersize=4, color=colour)
+            if not ring:
+                at_ends.loglog(each.epsilon, each.inside[i], marker="s", markersize=3, color=colour, linestyle="--")
+        ends = np.array([each.epsilon[0], each.epsilon[-1]])
+        for ax, values, order in ((far, each.rolling[0], 1.0), (at_ends, each.end[-1], 1.0 if ring else 0.5)):
+            level = (
+                values[0]
+                if order == 1
+                else values[len(each.epsilon) // 2] * (ends[0] / each.epsilon[len(each.epsilon) // 2]) ** 0.5
+            )
+            ax.loglog(ends, 0.6 * level * (ends / ends[0]) ** order, color=GREY, linewidth=1, label=f"slope {order:g}")
+        far.set(title=f"{each.scene.name}: distance from rolling discs", ylabel="largest distance at the end (length, rad)")
+        words = "slip" if ring else "slip: end discs (circles), inside (squares)"
+        at_ends.set(title=words, ylabel="largest |r. − e ω| at the end")
+        for ax in (far, at_ends):
+            ax.set_xlabel("ε, from sliding (right) to rolling (left)")
+            ax.grid(alpha=0.3, which="major")
+        far.legend(fontsize=8)
+        at_ends.legend(fontsize=8)
+    return list(axes.ravel())
 
 
 def loads(found: Mapping[str, Sequence[Study]]) -> Axes:
