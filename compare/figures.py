@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from compare.results import Growth, Study, WorkPrecision, compared
-from compare.slip import Slips
+from compare.results import Growth, Slips, Study, WorkPrecision, compared
 from continuum import Scene
 from discs import Solution
 from discs.arrays import Float

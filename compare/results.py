@@ -105,6 +105,40 @@ class Study:
         return ax
 
 
+@dataclass(frozen=True, eq=False)
+class Slips:
+    """Distances of sliding discs.
+
+    Attributes
+    ----------
+    scene : the scene. n : (S,), numbers of discs. epsilon : (E,), slips.
+    rolling : (S, E), distances from rolling discs of the same N. field : (S, E), from the rolling field.
+    end, inside : (S, E), largest slip of end discs and of inner ones, length per time; of a ring the same.
+    """
+
+    scene: Scene
+    n: tuple[int, ...]
+    epsilon: tuple[float, ...]
+    rolling: Float
+    field: Float
+    end: Float
+    inside: Float
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A row for each N and epsilon: distances, slips, and the orders in epsilon since the row before."""
+        found = []
+        for i, n in enumerate(self.n):
+            for j, epsilon in enumerate(self.epsilon):
+                values = [part[i, j] for part in (self.rolling, self.field, self.end, self.inside)]
+                orders = ["", "", ""]
+                if j:
+                    step = np.log(self.epsilon[j - 1] / epsilon)
+                    parts = self.rolling, self.end, self.inside
+                    orders = [f"{np.log(part[i, j - 1] / part[i, j]) / step:.2f}" for part in parts]
+                found.append((self.scene.name, str(n), f"{epsilon:.0e}", *(f"{value:.2e}" for value in values), *orders))
+        return found
+
+
 def _columns(fields: tuple[str, ...]) -> tuple[str, ...]:
     return ("ends", "N", "k", *(f"error {f}" for f in fields), *(f"order {f}" for f in fields))
 

@@ -13,7 +13,6 @@ slip at the end falls like epsilon**(1/2) only, while that inside falls like eps
 """
 
 import csv
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,51 +20,16 @@ from tqdm import tqdm
 
 from compare.lump import lump
 from compare.outputs import fresh_files
-from compare.results import format_table
+from compare.results import Slips, format_table
 from compare.study import apart
 from continuum import Scene, breathing_ring, solve, untwisting_rod
 from discs import Solution, simulate
-from discs.arrays import Float
 from discs.mechanics.ground import inner
 from discs.mechanics.sliding import slide
 
 SIZES = (9, 17, 33, 65, 129, 257)
 SLIPS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 DURATION = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class Slips:
-    """Distances of sliding discs.
-
-    Attributes
-    ----------
-    scene : the scene. n : (S,), numbers of discs. epsilon : (E,), slips.
-    rolling : (S, E), distances from rolling discs of the same N. field : (S, E), from the rolling field.
-    end, inside : (S, E), largest slip of end discs and of inner ones, length per time; of a ring the same.
-    """
-
-    scene: Scene
-    n: tuple[int, ...]
-    epsilon: tuple[float, ...]
-    rolling: Float
-    field: Float
-    end: Float
-    inside: Float
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """A row for each N and epsilon: distances, slips, and the orders in epsilon since the row before."""
-        found = []
-        for i, n in enumerate(self.n):
-            for j, epsilon in enumerate(self.epsilon):
-                values = [part[i, j] for part in (self.rolling, self.field, self.end, self.inside)]
-                orders = ["", "", ""]
-                if j:
-                    step = np.log(self.epsilon[j - 1] / epsilon)
-                    parts = self.rolling, self.end, self.inside
-                    orders = [f"{np.log(part[i, j - 1] / part[i, j]) / step:.2f}" for part in parts]
-                found.append((self.scene.name, str(n), f"{epsilon:.0e}", *(f"{value:.2e}" for value in values), *orders))
-        return found
 
 
 COLUMNS = (
