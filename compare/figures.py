@@ -73,44 +73,6 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
     return ax
 
 
-WANTED = {  # name in a study: in words, and its line
-    "velocity": ("velocity", {"color": GREY, "linestyle": "--"}),
-    "slope": ("direction r'", {"color": GREY, "linestyle": ":"}),
-    "energy inside": ("energy per length, inside", {"color": GREEN}),
-    "force inside": ("ground's force per length, inside", {"color": BLUE}),
-    "force weak": ("ground's force as a whole (smooth test functions)", {"color": BLUE, "linestyle": "--"}),
-    "end force": ("ground's force at the free ends", {"color": ORANGE}),
-    "end couple": ("ground's couple at the free ends", {"color": ORANGE, "linestyle": "--"}),
-}
-
-
-def limits_of_all(studies: Sequence[Study]) -> list[Axes]:
-    """Errors of velocities, slopes, energy and the ground's force against the number of discs; a panel for each study."""
-    figure = Figure(figsize=(5.2 * len(studies), 6.2), layout="constrained")
-    axes = list(figure.subplots(1, len(studies), squeeze=False, sharey=True)[0])
-    for ax, study in zip(axes, studies, strict=True):
-        kind = "own" if study.scene.steered else study.ends
-        start = len(study.fields) - len(study.names)
-        for name, error in zip(study.names, study.error.T[start:], strict=True):
-            words, style = WANTED[name]
-            ax.plot(study.n, error, marker="o", markersize=4, label=words, **style)
-        n = study.n[[0, -1]].astype(float)
-        slope = 1 if kind == "springs" and study.scene.rod.curvature == "linear" else 2
-        level = 0.5 * study.error[:, start:].min(axis=1)[0]
-        ax.plot(n, level * (n / n[0]) ** -slope, color=INK, linewidth=1)
-        ax.text(n[0], level, f"slope −{slope}  ", ha="left", va="top")
-        ax.set(xscale="log", yscale="log", title=KIND[kind], xlabel="number of discs N")
-        ax.set_xticks(study.n, minor=False)
-        ax.xaxis.set_major_formatter(ScalarFormatter())
-        ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.grid(alpha=0.3, which="major")
-    axes[0].set_ylabel("error; of energy and force relative to the field's largest value")
-    scene = studies[0].scene
-    figure.suptitle(f"Not only the positions converge: {scene.name}, {scene.rolling} law, t = {scene.duration:g}")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=9)
-    return axes
-
-
 def slip(found: Sequence[Slips]) -> list[Axes]:
     """Distance of sliding discs from rolling ones of the same N, and their slip, against epsilon; a row for each scene."""
     figure = Figure(figsize=(10.5, 4.4 * len(found)), layout="constrained")

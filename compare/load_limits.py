@@ -42,7 +42,7 @@ def _wave(s: Float) -> Float:
     return 0.5 * np.cos(0.5 * np.pi * s)
 
 
-def _fitting(s: Float, fields: int = 4) -> tuple[Float, ...]:
+def fitting_twist(s: Float, fields: int = 4) -> tuple[Float, ...]:
     """The straight rod, theta' ~ sin^5(pi s/4), so that it fits free and held ends; and zeros up to `fields`."""
     c = np.cos(0.25 * np.pi * s)
     return s, 0 * s, -1.5 * (c - 2 * c**3 / 3 + c**5 / 5), *(0 * s for _ in range(fields - 3))
@@ -102,11 +102,11 @@ def scenes() -> dict[str, Scene]:
     on_ring = {name: replace(ring, loads=loads) for name, loads in ON_A_RING.items()}
     bent = Rest(curvature=0.3, signal=signals.smooth(0.0, 1.2))
     on_rod[CURVED_ENDS] = replace(rod, loads=(bent,), duration=1.5)
-    fitting = replace(rod, initial=_fitting, duration=2.0)
+    fitting = replace(rod, initial=fitting_twist, duration=2.0)
     on_rod |= {name: replace(fitting, loads=loads) for name, loads in AT_AN_END.items()}
     beam = steered_rod(duration=1.5)
     own = {name: replace(beam, loads=loads) for name, loads in OWN_HEADINGS.items()}
-    fitting = replace(beam, initial=partial(_fitting, fields=6), duration=2.0)
+    fitting = replace(beam, initial=partial(fitting_twist, fields=6), duration=2.0)
     own |= {f"own, {name}": replace(fitting, loads=loads) for name, loads in AT_AN_END.items()}
     half, whole = np.pi / rod.rod.length, 2 * np.pi / rod.rod.length
     beams: dict[str, Any] = {

@@ -49,7 +49,7 @@ def overview(
     kinds = ("springs",) if scene.closed or scene.steered else ("springs", "consistent")
     for ends in kinds:
         checked_sizes(scene, n, ends)
-    from compare import figures  # and matplotlib, for the process that draws
+    from compare import figures, limit_figures  # and matplotlib, for the process that draws
 
     long = scene if scene.closed else replace(scene, duration=LONG * scene.duration)
     with fresh_files(out) as folder:
@@ -62,7 +62,7 @@ def overview(
         studies = [_awaited(future, "discs, plain ends", progress) for future in beside] + here
         write_csv(folder / "convergence.csv", studies)
         studies[0].plot(folder / "convergence.png", *studies[1:])
-        figures.save(figures.limits_of_all(studies)[0], folder / "limits-of-all.png")
+        figures.save(limit_figures.limits_of_all(studies)[0], folder / "limits-of-all.png")
         figures.motion(field, scene).savefig(folder / "motion.png", dpi=150)
         ax = figures.energy(
             _awaited(energies, "energy over a long time", progress) if energies else energy_runs(long, progress=progress)

@@ -60,6 +60,15 @@ class Study:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.diff(np.log(self.error), axis=0) / np.diff(np.log(self.k))[:, None]
 
+    @property
+    def order_spread(self) -> Float:
+        """By how much the last order differs from the two before it, (fields,); NaN of fewer than three sizes.
+
+        The error bar of a measured order. It is no bound: orders can all be off by more, see docs/accuracy.md.
+        """
+        order = self.order
+        return np.abs(order[-3:] - order[-1]).max(axis=0) if len(order) > 1 else np.full(len(self.fields), np.nan)
+
     def reaching(self, error: float) -> int:
         """The number of discs at which positions and angles have this error, by the power law through the last two rows."""
         worst = self.error[-2:, : len(compared(self.scene))].max(axis=1)
@@ -81,17 +90,16 @@ class Study:
         return f"{text}\n\n{self.wants_table()}" if self.names else text
 
     def wants_table(self) -> str:
-        """The table of wanted quantities, a line for each: errors, the last order, the estimated error of the field."""
+        """The table of wanted quantities, a line for each: errors, last order ± spread, estimated error of the field."""
         start = len(compared(self.scene))
         last = self.order[-1] if len(self.n) > 1 else np.full(len(self.fields), np.nan)
+        orders = [
+            f"{o:.2f} ± {d:.2f}".removesuffix(" ± nan") if np.isfinite(o) else "-"
+            for o, d in zip(last, self.order_spread, strict=True)
+        ]
         rows = [
-            (
-                name,
-                *(f"{e:.2e}" for e in errors),
-                *(f"{o:.2f}" if np.isfinite(o) else "-" for o in (order,)),
-                f"{floor:.0e}".replace("nan", "-"),
-            )
-            for name, errors, order, floor in zip(self.names, self.error.T[start:], last[start:], self.floors, strict=True)
+            (name, *(f"{e:.2e}" for e in errors), order, f"{floor:.0e}".replace("nan", "-"))
+            for name, errors, order, floor in zip(self.names, self.error.T[start:], orders[start:], self.floors, strict=True)
         ]
         return format_table([(self.ends, *(f"N = {n}" for n in self.n), "order", "field's"), *rows])
 

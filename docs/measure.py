@@ -1,11 +1,14 @@
 """Prints the figures of docs/accuracy.md that no test asserts and `make run` does not show. Takes some minutes."""
 
 import time as clock
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from compare import lump
+from compare import convergence, lump
+from compare.load_limits import fitting_twist
+from compare.quantities import WANTS
 from continuum import breathing_ring, exact, solve, steered_rod, untwisting_rod
 from continuum.mesh import semidiscretise
 from discs import Midpoint, Solution, Suzuki4, simulate
@@ -25,8 +28,22 @@ def chains(ends: str, sizes: tuple[int, ...]) -> list[np.ndarray]:
     return [last(run, sizes[0] - 1) for run in runs]
 
 
+def orders() -> None:
+    """Orders with consistent ends on the paper's twist, and on one that fits the free ends."""
+    sizes = (129, 257, 513, 1025, 2049, 4097)
+    for law in ("field", "unit"):
+        scene = untwisting_rod(law)
+        for name, each, n in (("paper's", scene, sizes), ("fitting", replace(scene, initial=fitting_twist), sizes[:4])):
+            field = solve(each, 1e-9, frames=1, progress=False, want=WANTS)
+            study = convergence(each, n, "consistent", field, progress=False, want=WANTS)
+            print(f"orders, {law} law, {name} twist, N = {n}")
+            for quantity, order, spread in zip(study.fields, study.order.T, study.order_spread, strict=True):
+                print(f"{quantity:14s}", *(f"{o:.2f}" for o in order), f"± {spread:.2f}")
+
+
 def main() -> None:
     """All of them."""
+    orders()
     sizes = (257, 513, 1025, 2049, 4097)
     u = chains("consistent", sizes)
     change = [np.abs(b - a).max(axis=1) for a, b in pairwise(u)]

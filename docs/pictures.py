@@ -1,4 +1,4 @@
-"""Make the pictures of docs/pictures.md, loads.png, motion.png, vakonomic.png and rod.gif: `docs/pictures.py`, 30 s.
+"""Make the pictures of docs/pictures.md, ground-force, loads, motion, vakonomic.png and rod.gif: `docs/pictures.py`, 40 s.
 
 The page's picture needs chromium. convergence.png, energy.png and limits.png are the main job's; `python -m continuum.figures
 docs/images` makes those of the field.
@@ -11,16 +11,18 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from compare import figures, lump
+from compare import convergence, figures, lump
+from compare.limit_figures import limits_of
 from continuum import solve, untwisting_rod
-from discs import simulate
+from discs import Solution, simulate
 from discs.loads import Damping, Torque, signals
 from discs.pictures import figures as of_discs
 from discs.pictures.animation import Stage
-from discs.pictures.style import BLUE, ORANGE
+from discs.pictures.style import BLUE, GREEN, INK, LABEL, ORANGE
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -64,6 +66,41 @@ def loads() -> Figure:
     return figure
 
 
+def ground_force() -> Figure:
+    """The ground's force along the line: inside, on the discs at an end, and how all of it converges."""
+    scene = untwisting_rod()
+    field = solve(scene, tol=1e-8, frames=1, want=("contact_force", "slope"))
+    figure = Figure(figsize=(13.2, 5.0), layout="constrained")
+    inside, end, limit = figure.subplots(1, 3)
+    inside.plot(field.s, along(field)[0], color=INK, label="the field, N → ∞")
+    for shift, (n, mark, colour) in zip((-0.25, 0.0, 0.25), ((33, "^", ORANGE), (129, "s", GREEN), (513, "o", BLUE)), strict=True):
+        run = simulate(lump(scene, n, "consistent"), "gauss8", 0.01, frames=1, want=("contact_force", "slope"), progress=False)
+        force, k, each = along(run)[0], run.problem.chain.k, slice(None, None, max(1, n // 64))
+        inside.plot(run.s[each], (force / run.problem.chain.w)[each], mark, color=colour, markersize=4, label=f"{n} discs")
+        end.bar(np.arange(6) + shift, k * force[:6], 0.25, color=colour, label=f"{n} discs")
+    inside.set(ylim=(-4.5, 4.5), xlabel=LABEL["s"], ylabel="force on a disc over its length", title="Inside: a force per length")
+    inside.annotate("the last discs: see right", (0.3, 4.4), (0.75, 3.6), arrowprops={"arrowstyle": "->"})
+    force, couple = np.hypot(*field.end_force[0, 0]), np.hypot(*field.end_couple[0, 0])
+    words = f"Each force grows like N. The sum tends to {force:.1f},\nthe end force; the moment about the end"
+    words += f"\nto {couple:.2f}, the end couple."
+    end.text(0.03, 0.03, words, transform=end.transAxes, fontsize=9)
+    end.set(ylim=(-7.6, 4.6), xlabel="disc, counted from the end", ylabel="force on a disc times its spacing k")
+    end.set_title("At an end: a force and a couple")
+    limits_of(convergence(scene, (129, 257, 513, 1025), "consistent", field, want=("contact_force",)), limit)
+    limit.set(ylim=(3e-5, 2e-1), title="All of it converges", ylabel="error, relative to the field's largest value")
+    for ax in (inside, end, limit):
+        ax.legend(fontsize=8)
+        ax.grid(alpha=0.3)
+    figure.suptitle("The ground's force on the paper's rod, its part along the line, at t = 4.5")
+    return figure
+
+
+def along(run: Solution) -> np.ndarray:
+    """The ground's force along the line, (F, n)."""
+    slope = run.slope_x + 1j * run.slope_y
+    return ((run.contact_force[:, 0] - 1j * run.contact_force[:, 1]) * slope / abs(slope)).real
+
+
 def main() -> None:
     scene = untwisting_rod()
     run = simulate(lump(scene, n=32, ends="consistent"), dt=0.02, frames=91)
@@ -73,6 +110,7 @@ def main() -> None:
     figures.motion(solve(scene, tol=1e-3, frames=5), scene).savefig(IMAGES / "motion.png", dpi=110)
     of_discs.vakonomic().savefig(IMAGES / "vakonomic.png", dpi=110)
     loads().savefig(IMAGES / "loads.png", dpi=100)
+    ground_force().savefig(IMAGES / "ground-force.png", dpi=100)
     if not shutil.which("chromedriver"):
         sys.exit("no chromedriver: view.png is not made")
     few = simulate(lump(scene, n=17), dt=0.02, frames=91)

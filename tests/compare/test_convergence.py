@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from compare import convergence, lump
-from compare.results import write_csv
+from compare.load_limits import fitting_twist
+from compare.results import Study, write_csv
 from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
 from discs import Gauss8, simulate
 from discs.loads import Damping, Rest, Slope
@@ -22,6 +23,24 @@ def test_consistent_ends_converge_at_order_two(paper_field):
     assert (study.order >= 1.9).all(), study.table()
     assert (study.order <= 2.4).all(), study.table()
     assert study.error[-1].max() < 5e-4
+
+
+def test_order_is_two_where_the_twist_fits_the_free_ends(paper_field):
+    """The paper's twist violates the second time derivative of an end condition; orders are above 2 up to thousands of discs."""
+    scene = replace(untwisting_rod(), initial=fitting_twist)
+    fitting = convergence(scene, (65, 129, 257, 513), "consistent", tol=1e-7, progress=False)
+    assert np.abs(fitting.order[-1] - 2).max() < 0.02, fitting.table()
+    assert fitting.order_spread.max() < 0.05
+    papers = convergence(untwisting_rod(), (129, 257, 513), "consistent", field=paper_field, progress=False)
+    assert papers.order[-1].min() > 2.1, papers.table()
+
+
+def test_spread_of_orders_is_the_largest_change_of_the_last_one():
+    k = 0.5 ** np.arange(5.0)
+    error = np.cumprod(np.concatenate([[1.0], 0.5 ** np.array([9.0, 1.8, 2.1, 2.0])]))[:, None] * np.ones(3)
+    study = Study(untwisting_rod(), "springs", 2 ** np.arange(4, 9) + 1, k, error, 0.0, 0.1)
+    assert study.order_spread == pytest.approx([0.2] * 3)
+    assert np.isnan(replace(study, n=study.n[:2], k=k[:2], error=error[:2]).order_spread).all()
 
 
 def test_plain_springs_tend_to_order_one(paper_field):
