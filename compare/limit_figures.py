@@ -24,7 +24,7 @@ WANTED: dict[str, tuple[str, dict[str, Any]]] = {  # name in a study: in words, 
 
 def limits_of_all(studies: Sequence[Study]) -> list[Axes]:
     """Errors of velocities, slopes, energy and the ground's force against the number of discs; a panel for each study."""
-    figure = Figure(figsize=(5.2 * len(studies), 6.2), layout="constrained")
+    figure = Figure(figsize=(max(7.6, 5.2 * len(studies)), 6.2), layout="constrained")
     axes = list(figure.subplots(1, len(studies), squeeze=False, sharey=True)[0])
     for ax, study in zip(axes, studies, strict=True):
         limits_of(study, ax)

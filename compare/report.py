@@ -1,4 +1,4 @@
-"""Everything on one page: the scene, its motion, N -> infinity, two laws of rolling, energy, speed, stability, versions."""
+"""Everything on one page: scene, motion, N -> infinity, the ground's force, two laws, energy, speed, stability, versions."""
 
 import base64
 import csv
@@ -22,6 +22,7 @@ from tqdm import tqdm
 from compare import figures
 from compare.background import background
 from compare.hardcases.table import stability
+from compare.limit_figures import limits_of_all
 from compare.main_job import INSTANTS, LONG, energy_runs
 from compare.outputs import fresh_files
 from compare.peers import reduced
@@ -142,10 +143,12 @@ def report(
         stage("the scene and its motion")
         fields = {law: solve(scene, tol, frames=FRAMES, progress=False) for law, scene in scenes.items()}
         later = {law: _studied(scene, sizes, fields[law], beside) for law, scene in scenes.items()}
+        ground = beside.submit(_of_the_ground, scenes["field"], sizes, min(tol, 1e-6))
         _scene(page, scenes["field"])
         _motion(page, scenes, fields)
         stage("N to infinity")
         _limit(page, {law: [future.result() for future in futures] for law, futures in later.items()})
+        _ground(page, ground.result())
         _laws(page, fields)
         stage("energy")
         _energy(page, energies.result(), first)
@@ -201,6 +204,21 @@ def _limit(page: Page, studies: dict[str, list[Study]]) -> None:
         rows = [row for study in pair for row in study.rows()]
         page.figure(f"convergence_{law}", figures.convergence(pair), f"Discs against the {law} law's field.", pair[0].columns, rows)
         page.add(table(pair[0].columns, rows))
+
+
+def _of_the_ground(scene: Scene, n: tuple[int, ...], tol: float) -> Study:
+    return convergence(scene, n, "consistent", tol=tol, want=("contact_force",), progress=False)
+
+
+def _ground(page: Page, study: Study) -> None:
+    columns, *rows = study.wants_rows()
+    page.add(
+        "## The force of the ground",
+        "Inside the rod it tends to a force per length, at each free end to a force and a couple; forces on the last discs grow "
+        "like N. Errors with consistent ends, field law, relative to the largest value; ± is the spread of the last three orders.",
+    )
+    page.figure("ground", limits_of_all([study])[0], "The ground's force on discs against the field's.", columns, rows)
+    page.add(table(columns, rows))
 
 
 def _laws(page: Page, fields: dict[str, Solution]) -> None:

@@ -90,18 +90,24 @@ class Study:
         return f"{text}\n\n{self.wants_table()}" if self.names else text
 
     def wants_table(self) -> str:
-        """The table of wanted quantities, a line for each: errors, last order ± spread, estimated error of the field."""
+        """The table of wanted quantities, aligned for a terminal."""
+        return format_table(self.wants_rows())
+
+    def wants_rows(self) -> list[tuple[str, ...]]:
+        """Its heading, and a row for each quantity: errors, last order ± spread, estimated error of the field."""
         start = len(compared(self.scene))
         last = self.order[-1] if len(self.n) > 1 else np.full(len(self.fields), np.nan)
         orders = [
             f"{o:.2f} ± {d:.2f}".removesuffix(" ± nan") if np.isfinite(o) else "-"
             for o, d in zip(last, self.order_spread, strict=True)
         ]
-        rows = [
-            (name, *(f"{e:.2e}" for e in errors), order, f"{floor:.0e}".replace("nan", "-"))
-            for name, errors, order, floor in zip(self.names, self.error.T[start:], orders[start:], self.floors, strict=True)
+        return [
+            (self.ends, *(f"N = {n}" for n in self.n), "order", "field's"),
+            *(
+                (name, *(f"{e:.2e}" for e in errors), order, f"{floor:.0e}".replace("nan", "-"))
+                for name, errors, order, floor in zip(self.names, self.error.T[start:], orders[start:], self.floors, strict=True)
+            ),
         ]
-        return format_table([(self.ends, *(f"N = {n}" for n in self.n), "order", "field's"), *rows])
 
     def plot(self, path: str | Path | None = None, *others: "Study", ax: "Axes | None" = None) -> "Axes":
         """Error against n, with `others` in the same axes; saved if a path is given."""

@@ -69,11 +69,12 @@ def test_every_picture_has_its_data(written):
     names = {p.name for p in written.iterdir()}
     page = (written / "report.md").read_text(encoding="utf-8")
     pictures = re.findall(r"!\[[^\]]*\]\(([^)]*\.png)\)", page)
-    assert len(pictures) == 8
+    assert len(pictures) == 9
     for picture in pictures:
         assert {picture, picture.replace(".png", ".csv")} <= names
         assert len((written / picture.replace(".png", ".csv")).read_text(encoding="utf-8").splitlines()) > 1
-    for heading in ("The scene", "The motion", "N → ∞", "The paper's law", "Energy", "Speed", "Hard cases", "Made with"):
+    headings = "The scene", "The motion", "N → ∞", "The force of the ground", "The paper's law", "Energy", "Speed", "Hard cases"
+    for heading in (*headings, "Made with"):
         assert f"## {heading}" in page
 
 
@@ -84,7 +85,7 @@ def test_page_needs_nothing_beside_it(written, tmp_path, browser):
     browser.get(alone.as_uri())
     assert browser.title == "N rolling discs and the rod they become"
     images = browser.execute_script("return [...document.images].map(i => [i.complete, i.naturalWidth, i.src.slice(0, 22)])")
-    assert len(images) == 8
+    assert len(images) == 9
     assert all(complete and width > 300 and kind == "data:image/png;base64," for complete, width, kind in images)
     assert browser.execute_script("return performance.getEntriesByType('resource').filter(e => !e.name.startsWith('data:'))") == []
     assert browser.get_log("browser") == []
@@ -95,7 +96,7 @@ def test_page_needs_nothing_beside_it(written, tmp_path, browser):
 def test_links_lead_to_the_data(written, browser):
     browser.get((written / "report.html").as_uri())
     links = browser.execute_script("return [...document.querySelectorAll('a')].map(a => a.getAttribute('href'))")
-    assert len(links) == 9
+    assert len(links) == 10
     assert all((written / unquote(link)).is_file() for link in links)
 
 
