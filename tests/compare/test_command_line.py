@@ -33,6 +33,7 @@ def test_limits_are_part_of_it(tmp_path, monkeypatch, capsys):
     assert f"limits of {tmp_path}" in capsys.readouterr().out
 
 
+@pytest.mark.long  # the paper's scheme with own headings has a kernel of its own
 def test_steered_scene(tmp_path, capsys):
     (tmp_path / "steered.toml").write_text('scene = "steered_rod"\nduration = 0.5\nshear_stiffness = 6.0\nradius = 0.7\n')
     out = tmp_path / "out"

@@ -65,6 +65,7 @@ def test_chains_tend_to_the_field_with_a_driven_and_a_held_end(rolling):
     assert run.omega[:, 0] == pytest.approx(0.8 * SMOOTH(run.t), abs=1e-7)  # on the polynomial of a step
 
 
+@pytest.mark.parametrize("rolling", ["field", pytest.param("unit", marks=pytest.mark.long)])  # each has its kernel
 def test_a_driven_end_is_not_bent_nor_stretched(rolling):
     """No curvature and |r'| = 1, as at a free end; the engines agree in rates, places and torques."""
     scene = replace(untwisting_rod(rolling, **UNEVEN, twist=0.0, duration=1.5), loads=DRIVEN)

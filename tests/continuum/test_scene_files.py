@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from compare import lump
-from compare.entrants import peers
 from continuum import solve
 from continuum.files import read_scene
 from continuum.parameters import polynomial, table
@@ -80,8 +79,6 @@ def test_loads_in_a_file_are_those_of_the_discs(tmp_path):
     assert scene.description()["loads"][1].startswith("Damping(rolling=0.1")
     field = solve(scene, 1e-3, progress=False)
     assert 0 < field.dissipated[-1] < abs(field.work[-1])
-    with pytest.raises(ValueError, match="peers take a problem without loads"):
-        peers(problem)
     with pytest.raises(ValueError, match="loads of a scene must be a tuple of loads on a rod"):
         replace(scene, loads=(3,))
 
