@@ -28,7 +28,7 @@ long: .venv/dev kernels field
 # a contributor's loop: no lessons, sites, browsers or methods that take long to compile
 quick: .venv/dev
 	$(MAKE) --no-print-directory --jobs 2 lint types
-	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest -m "not slow and not long"
 
 lint: .venv/dev
 	$(BIN)/ruff check --quiet .

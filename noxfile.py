@@ -10,4 +10,4 @@ nox.options.default_venv_backend = "uv|virtualenv"  # uv also finds Pythons that
 def tests(session: nox.Session) -> None:
     """`nox -s tests-3.13 -- -k twins`: pytest's arguments follow the two dashes; without, what `make quick` runs."""
     session.install("--editable", ".[cluster,contact]", *nox.project.dependency_groups(PROJECT, "test"))
-    session.run("pytest", *(session.posargs or ("-m", "not slow")))
+    session.run("pytest", *(session.posargs or ("-m", "not slow and not long")))
