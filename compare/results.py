@@ -102,7 +102,7 @@ class Study:
             for o, d in zip(last, self.order_spread, strict=True)
         ]
         return [
-            (self.ends, *(f"N = {n}" for n in self.n), "order", "field's"),
+            (self.ends, *(f"N = {n}" for n in self.n), "order", "field's error"),
             *(
                 (name, *(f"{e:.2e}" for e in errors), order, f"{floor:.0e}".replace("nan", "-"))
                 for name, errors, order, floor in zip(self.names, self.error.T[start:], orders[start:], self.floors, strict=True)

@@ -33,7 +33,7 @@ class Friction:
     inner : (F,), the largest one of discs an eighth of the length away from free ends; NaN if there are none. It converges for
         n -> infinity.
     end_force, end_couple : (F, 2, 2), [frame, end, component], force and couple of the ground at the free ends, from the discs
-        there, see `discs.mechanics.ground`; None of rings and of chains of fewer than 35 discs.
+        there, rough for fewer than some hundred discs, see `discs.mechanics.ground`; None of rings and of fewer than 35 discs.
     """
 
     discs: Float
