@@ -33,21 +33,28 @@ class Friction:
     inner : (F,), the largest one of discs an eighth of the length away from free ends; NaN if there are none. It converges for
         n -> infinity.
     end_force, end_couple : (F, 2, 2), [frame, end, component], force and couple of the ground at the free ends, from the discs
-        there, rough for fewer than some hundred discs, see `discs.mechanics.ground`; None of rings and of fewer than 35 discs.
+        there, see `discs.mechanics.ground`; None of rings and of fewer than 35 discs.
+    end_force_error, end_couple_error : (F, 2), [frame, end], their estimated errors.
     """
 
     discs: Float
     inner: Float
     end_force: Float | None = None
     end_couple: Float | None = None
+    end_force_error: Float | None = None
+    end_couple_error: Float | None = None
 
     def __str__(self) -> str:
         words = f"friction coefficient inside: {np.max(self.inner):.3g}"
-        if self.end_force is None or self.end_couple is None:
+        at_ends = (self.end_force, self.end_force_error), (self.end_couple, self.end_couple_error)
+        force, couple = (
+            "" if value is None or error is None else f"{np.hypot(*np.moveaxis(value, -1, 0)).max():.3g} ± {error.max():.1g}"
+            for value, error in at_ends
+        )
+        if not force:
             return words
-        force, couple = (np.hypot(ends[..., 0], ends[..., 1]).max() for ends in (self.end_force, self.end_couple))
         return (
-            f"{words}; at the free ends a force up to {force:.3g} and a couple up to {couple:.3g} (the end discs need up to "
+            f"{words}; at the free ends a force up to {force} and a couple up to {couple} (the end discs need up to "
             f"{self.discs.max():.3g}, which grows with their number)"
         )
 
@@ -71,6 +78,8 @@ class Slip:
 def friction_needed(run: Solution, weight: ArrayLike) -> Friction:
     """The friction coefficients |lambda|/N that rolling needs, and the ground's force and couple at free ends.
 
+    A warning is given if these are rough, see `discs.mechanics.ground.end_forces`.
+
     Parameters
     ----------
     run : a run with want=("contact_force",).
@@ -81,9 +90,7 @@ def friction_needed(run: Solution, weight: ArrayLike) -> Friction:
     ------
     ValueError : if the run has no ground forces, or a weight is not positive.
     """
-    force, away = forces(run), inner(run)
-    pressed = checks.field("weight", weight, run.x.shape[1], least=0.0, strict=True)
-    needed: Float = np.hypot(force[:, 0], force[:, 1]) / pressed
+    needed, away = _needed(run, weight), inner(run)
     inside = needed[:, away].max(axis=1) if away.any() else np.full(needed.shape[0], np.nan)
     if away.all() or away.size < LEAST:
         return Friction(needed, inside)
@@ -106,8 +113,7 @@ def first_slip(run: Solution, weight: ArrayLike, mu: ArrayLike, ends: bool = Fal
     ------
     ValueError : as `friction_needed`; if mu is not positive; if no disc is away from the ends.
     """
-    found = friction_needed(run, weight)
-    needed, away = found.discs, inner(run)
+    needed, away = _needed(run, weight), inner(run)
     if not ends and not away.any():
         raise ValueError(f"none of {away.size} discs is an eighth of the length away from the free ends; take ends=True")
     excess = needed - checks.field("mu", mu, needed.shape[1], least=0.0, strict=True)
@@ -130,3 +136,11 @@ def first_slip(run: Solution, weight: ArrayLike, mu: ArrayLike, ends: bool = Fal
             f"this slip is of {away.size} discs, not of a rod; take ends=False, and `friction_needed` for what acts at the ends"
         )
     return slip
+
+
+def _needed(run: Solution, weight: ArrayLike) -> Float:
+    """|lambda|/N of each disc, (F, n)."""
+    force = forces(run)
+    pressed = checks.field("weight", weight, run.x.shape[1], least=0.0, strict=True)
+    needed: Float = np.hypot(force[:, 0], force[:, 1]) / pressed
+    return needed

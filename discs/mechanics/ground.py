@@ -5,42 +5,59 @@ couple at each free end (docs/ground-force.md). On a chain these are carried by 
 
     force = sum_i (lambda_i - w_i lambda(s_i)),   couple = sum_i (s_i - s_end) (lambda_i - w_i lambda(s_i)),
 
-summed over the discs near the end, with the force per length lambda(s) that is found inside continued to the end. Discs with their
-own headings have the force alone; their couple tends to zero.
+summed over the discs near the end, with the force per length lambda(s) that is found inside continued to the end. With headings of
+their own the end disc alone carries the force, and there is no couple.
+
+**Continuation.** Beyond the discs that the end disturbs (six with slaved headings, and more than one in a hundred; one with own
+headings) a polynomial of degree 5 in s is fitted to lambda_i/w_i of the next nine discs, or one in 32.
+
+**Error.** (a) That of the continuation is the change to another one: half as many discs more are left out, and the degree is 4.
+(b) That of the discs: their end is uncertain by about half a spacing. At plain ends, of first order, it moves the force by
+(k/2) lambda and the couple by (k/2) force; at other ends, of second order, by (k/2)^2 lambda' and (k/2)^2 lambda. The estimate is
+the sum, lambda being that at the end.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from discs import checks
 from discs.arrays import Float
+from discs.chains.chain import SteeredChain
 from discs.solution import Solution
+from discs.warn import warn
 
-NEAR = 8  # discs at an end
-DEGREE = 4  # of the polynomial in s through lambda_i/w_i of the next NEAR + 1 discs, which continues it
-LEAST = 4 * NEAR + 3  # discs of a chain
+DISTURBED, FITTED, DEGREE = 6, 9, 5
+LEAST = 2 * (DISTURBED + DISTURBED // 2 + FITTED) - 1  # discs of a chain
 SHARE = 1 / 8  # of the length, near each free end: where `inner` has no discs
+ROUGH = 0.1  # error over value from which on there is a warning
+NEGLIGIBLE = 1e-6  # of the couple K/length
 
 
 class EndForces(NamedTuple):
-    """Forces and couples of the ground at the two free ends, (F, 2, 2) each, [frame, end, component]."""
+    """Forces and couples of the ground at the two free ends, (F, 2, 2) each, [frame, end, component].
+
+    force_error, couple_error : (F, 2), [frame, end], their estimated errors, the largest of both components.
+    """
 
     force: Float
     couple: Float
+    force_error: Float
+    couple_error: Float
 
 
 def end_forces(run: Solution, inside: Float | None = None) -> EndForces:
-    """The ground's force and couple at the free ends of a run of discs, from the discs near them.
+    """The ground's force and couple at the free ends of a run of discs, from the discs near them, with estimates of their errors.
 
     Parameters
     ----------
     run : with want=("contact_force",), of at least 35 discs.
     inside : (F, 2, n), the force per length of the limit at the discs, as of `continuum.solve`, if it is known. The sums are then
-        over an eighth of the length at each end; otherwise over NEAR discs, with the force inside continued by a polynomial. There
-        is no error estimate: compare two numbers of discs. On the paper's rod with consistent ends force and couple are off by
-        29 % and 8 % with 129 discs, 9 % and 1.3 % with 257, and 0.02 % and 0.03 % with 1025.
+        over an eighth of the length at each end, and the errors are those of the discs alone. Otherwise a warning is given if the
+        largest estimated error is above a tenth of the largest value: the force inside then rises more steeply towards the end
+        than so few discs show.
 
     Raises
     ------
@@ -54,24 +71,59 @@ def end_forces(run: Solution, inside: Float | None = None) -> EndForces:
         )
     if inside is None and chain.n < LEAST:
         raise ValueError(f"end forces of a chain alone need at least {LEAST} discs; got {chain.n}: take more, or give `inside`")
-    s, per_length = chain.s, lam / chain.w
-    force, couple = np.empty((2, lam.shape[0], 2, 2))
-    for end in (0, 1):
-        away = s if end == 0 else chain.length - s[::-1]
-        found, w = (lam, chain.w) if end == 0 else (lam[..., ::-1], chain.w[::-1])
+    own = isinstance(chain, SteeredChain)
+    few = 1 if own else max(DISTURBED, chain.n // 100)
+    s, k = chain.s, chain.k
+    values, errors = np.empty((2, lam.shape[0], 2, 2)), np.empty((2, lam.shape[0], 2))
+    for end, order in enumerate((1, -1)):
+        found, w = lam[..., ::order], chain.w[::order]
         if inside is None:
-            near = slice(NEAR)
-            fit, unit = slice(NEAR, 2 * NEAR + 1), away[NEAR]
-            values = (per_length if end == 0 else per_length[..., ::-1])[..., fit]
-            c = np.polynomial.polynomial.polyfit(away[fit] / unit, values.reshape(-1, NEAR + 1).T, DEGREE)
-            limit = np.polynomial.polynomial.polyval(away[near] / unit, c).reshape(*lam.shape[:2], NEAR)
+            limit, slope = _continued(s, found / w, few, DEGREE)
+            other, _ = _continued(s, found / w, few + (few + 1) // 2, DEGREE - 1)
+            change = _sums(found, w, s, limit) - _sums(found, w, s, other)
         else:
-            near = slice(int((away < SHARE * chain.length).sum()))
-            limit = (inside if end == 0 else inside[..., ::-1])[..., near]
-        rest = found[..., near] - w[near] * limit
-        force[:, end] = rest.sum(axis=-1)
-        couple[:, end] = (1 if end == 0 else -1) * (rest * away[near]).sum(axis=-1)
-    return EndForces(force, couple)
+            known = inside[..., ::order]
+            limit, slope = known[..., s < SHARE * chain.length], (known[..., 1] - known[..., 0]) / k
+            change = np.zeros_like(values[:, :, end])
+        values[:, :, end] = _sums(found, w, s, limit)
+        if own or chain.ends == "consistent":
+            moved = (k / 2) ** 2 * np.stack([slope, limit[..., 0]])
+        else:
+            moved = k / 2 * np.stack([limit[..., 0], values[0, :, end]])
+        errors[:, :, end] = (np.abs(change) + np.abs(moved)).max(axis=-1)
+    values[1, :, 1] *= -1  # there s was the distance from the end
+    if inside is None:
+        bend = np.max(chain.bending_stiffness) / chain.length  # the couple that bends the rod; far smaller ones are rounding
+        _warn_if_rough(values, errors, (NEGLIGIBLE * bend / chain.length, NEGLIGIBLE * bend), chain.n)
+    return EndForces(*values, *errors)
+
+
+def _continued(s: Float, values: Float, n: int, degree: int) -> tuple[Float, Float]:
+    """A polynomial through values (F, 2, N) of the discs after the first n: its values there, (F, 2, n), and slope at s = 0."""
+    fit, unit = slice(n, n + max(FITTED, s.size // 32)), s[n]
+    c = polynomial.polyfit(s[fit] / unit, values[..., fit].reshape(-1, s[fit].size).T, degree)
+    found, slope = polynomial.polyval(s[:n] / unit, c), c[1] / unit
+    return found.reshape(*values.shape[:2], n), slope.reshape(values.shape[:2])
+
+
+def _sums(lam: Float, w: Float, s: Float, limit: Float) -> Float:
+    """Sums of the first discs' forces less w limit (F, 2, n), and their first moments, (2, F, 2)."""
+    n = limit.shape[-1]
+    rest = lam[..., :n] - w[:n] * limit
+    return np.stack([rest.sum(axis=-1), (rest * s[:n]).sum(axis=-1)])
+
+
+def _warn_if_rough(values: Float, errors: Float, least: tuple[float, float], n: int) -> None:
+    rough = [
+        f"{name} (up to {np.abs(value).max():.2g}) by about {error.max():.1g}"
+        for name, value, error, negligible in zip(("force", "couple"), values, errors, least, strict=True)
+        if value.any() and error.max() > max(ROUGH * np.abs(value).max(), negligible)
+    ]
+    if rough:
+        warn(
+            f"at the free ends the ground's {' and '.join(rough)} may be wrong: {n} discs are too few there; "
+            "take more discs, with slaved headings ends='consistent', or the field, solve(scene, want='contact_force')"
+        )
 
 
 def inner(run: Solution) -> NDArray[np.bool_]:
