@@ -51,8 +51,8 @@ from continuum.motors import Motors
 from continuum.timing import Timing
 from continuum.viscous import Viscous
 from discs.arrays import Float, Int
+from discs.kernels.limits import HELD
 from discs.loads import signals
-from discs.loads.motor import HELD
 from discs.loads.signals import Signal
 
 

@@ -20,10 +20,11 @@ from discs.loads import OnRod
 from discs.loads.tables import load_of_words
 from discs.mechanics import Trajectory
 from discs.problem import Problem
+from discs.running.engine import ENGINES
 from discs.running.frames import WANTS
 from discs.running.step_error import doubts
 from discs.running.time_loop import SimulationError
-from discs.simulation import ENGINES, simulate
+from discs.simulation import simulate
 from discs.solution import Solution
 
 OFFERS = sorted({name for method in METHODS.values() for name in method.offers})

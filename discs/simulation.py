@@ -15,6 +15,7 @@ from discs.arrays import Float
 from discs.integrators import METHODS, Integrator, find, from_settings
 from discs.integrators.base import Cut
 from discs.problem import Problem
+from discs.running.engine import plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.recording import Recording, Rows, kept_settings
 from discs.running.stats import Stats, of_search
@@ -26,7 +27,6 @@ from discs.solution import Solution
 from discs.warn import warn
 
 MOST_STEPS = 2.0**53
-ENGINES = ("compiled", "plain")
 Result = TypeVar("Result")
 ENERGY_DRIFT_WARNING = 0.01  # relative
 
@@ -62,7 +62,7 @@ def simulate(
     checkpoint : a file, as "run.nc", to which frames are written as they are computed, in bounded memory. If it exists, its run
         continues where it was interrupted, to the same bits as one unbroken run; see docs/archives.md. With a tolerance, method and
         step are found first, by runs of at most 101 frames in memory; a run that continues takes them from its file.
-    engine : "compiled", or "plain" for NumPy and SciPy. Discs with true curvature have only the plain form.
+    engine : "compiled", or "plain" for NumPy and SciPy. What has only the plain form takes it, and `stats["plain_because"]` says why.
 
     Returns
     -------
@@ -197,8 +197,7 @@ def _run(
     checked : estimate the error of the steps. more : further entries of `stats`. estimate : of the errors, if known.
     """
     want = () if want == () else wanted(want, integrator.offers)
-    wished = checks.choice("engine", engine, ENGINES) == "compiled"
-    compiled = wished and problem.system.parameters is not None and integrator.compiles
+    because = plain_because(problem, integrator, engine)
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
@@ -222,12 +221,12 @@ def _run(
         "method": integrator.name,
         "order": integrator.order,
         "settings": integrator.settings,
-        "engine": "compiled" if compiled else "plain",
+        "engine": "plain" if because else "compiled",
         "want": list(want),
         "dt": h,
         "dt_suggested": suggested,
     }
-    about |= more or {}
+    about |= (more or {}) | (Stats(plain_because=because) if because else {})
     record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about, estimate)
     steps, rest = steps_before(end, h)
     shown = Progress(integrator.name, steps) if progress else None
@@ -236,7 +235,7 @@ def _run(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown or NO_BAR, record:
         if record.complete:
             return record.solution({})
-        march = March(problem, integrator, h, compiled, not progress, watch)
+        march = March(problem, integrator, h, not because, not progress, watch)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)

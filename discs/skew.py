@@ -74,6 +74,7 @@ class Load(ABC):
     passive : whether its power is that of -U and of dampers only, so that the energy can fall but not grow.
     least : a lower bound of U, used to detect blow-up; -inf if none is known.
     parameters : for the compiled form, see `discs.kernels.load`; None if there is none.
+    signals : of `parameters`, each with the name of its load.
     """
 
     damping: Float
@@ -84,6 +85,7 @@ class Load(ABC):
     conservative: bool = False
     passive: bool = False
     least: float = -np.inf
+    signals: tuple[tuple[Any, str], ...] = ()
 
     def potential(self, t: float, q: Float) -> float:
         """U, the load's part of the energy, at the time t and positions (rows, n); 0 where it has none."""

@@ -52,16 +52,15 @@ def timed(problem: Problem, jit: Callable[..., Any]) -> Any:
         raise ValueError(f"peers take loads with a compiled form; got {load!r}")
     kind, others, given, fill, count = type(chain), chain[:-1], chain.load, signals(load, jit), len(load.drives)
     constant, damping, stiffness, level, viscosity, patterns, pushed = given[:7]
-    bends, spent = given.bends, given.spent
+    bends, spent, axles = given.bends, given.spent, given.axles
 
     @jit
     def at(t):  # type: ignore[no-untyped-def]
         now, near = np.empty((1, count)), np.zeros(1)
         fill(t, now[0])
         times = np.array([t])
-        return kind(
-            *others, table(constant, damping, stiffness, level, viscosity, patterns, pushed, times, now, near, bends, spent)
-        )
+        parts = constant, damping, stiffness, level, viscosity, patterns, pushed, times, now, near, bends, spent, axles
+        return kind(*others, table(*parts))
 
     return at
 

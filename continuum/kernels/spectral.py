@@ -239,5 +239,5 @@ def _moved(rod, method, room, sweep, h):
 
 
 @fill(do.finish, Spectral)
-def _finish(rod, method, room, before, h):
+def _finish(rod, work, method, room, before, h):
     """Nothing: `continuum.stepping` computes the work of loads, step by step as they are accepted."""

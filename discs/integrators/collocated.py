@@ -133,14 +133,13 @@ class Collocated(OneStep, ABC):
 
     def _react(self, system: SkewGradient, load: Load, z: Phase, t: float, h: float, v: Float, p: Float, work: Work) -> None:
         """Book the work of motors: h b_j c_j tau_j P_j, where P_i = pi_n - h sum_j a_ij (C^T (grad V - f) - c tau)_j."""
-        rule, shape, pulls = self.rule, system.shape(z.hi, z.lo), []
-        for node, move, rate in zip(rule.nodes, h * _mix(rule.a, v), v, strict=True):
+        rule, shape = self.rule, system.shape(z.hi, z.lo)
+        parts = rule.nodes, rule.b, h * _mix(rule.a, v), p, _mix(rule.inverse, p - z.pi)
+        for node, b, move, mean, gained in zip(*parts, strict=True):
             moved = system.moved(shape, move)
-            f = load.applied(t + node * h, z.hi + (z.lo + move), rate)
-            pulls.append(system.back(system.basis(moved), system.gradient(moved) - f))
-        gained = _mix(rule.b[:, None] * np.linalg.inv(rule.a), p - z.pi + h * _mix(rule.a, np.array(pulls)))
-        for part, mean in zip(gained, p, strict=True):
-            work.react(load, part, mean)
+            c = system.basis(moved)
+            f = load.applied(t + node * h, z.hi + (z.lo + move), system.forward(c, mean))
+            work.react(load, b * (gained + h * system.back(c, system.gradient(moved) - f)), mean)
 
     @cached_property
     def parameters(self) -> "Collocation":

@@ -16,8 +16,8 @@ from discs.skew import Phase
 class Tableau(NamedTuple):
     """Coefficients of an s-stage collocation method.
 
-    a : (s, s). b, nodes : (s,), weights, and places in [0, 1]. last : (s,), b^T a^{-1}, from the momenta of stages to those at the
-    end of the step.
+    a, inverse : (s, s), and a^{-1}. b, nodes : (s,), weights, and places in [0, 1]. last : (s,), b^T a^{-1}, from the momenta of
+    stages to those at the end of the step.
 
     a is diagonalised. real : its real eigenvalues (none or one). pairs : the complex ones with positive imaginary part, each for a
     pair. real_in, pairs_in : (number, s), rows that project stages on the eigenvectors. real_out, pairs_out : (number, s), the
@@ -25,6 +25,7 @@ class Tableau(NamedTuple):
     """
 
     a: Float
+    inverse: Float
     b: Float
     nodes: Float
     last: Float
@@ -62,7 +63,7 @@ def _collocation(c: Float, b: Float | None) -> Tableau:
     last = np.linalg.solve(a.T, b).astype(float, copy=False)
     of_real = values[real].real, into[real].real, out.T[real].real
     of_pairs = values[upper].astype(complex), into[upper].astype(complex), 2 * out.T[upper].astype(complex)
-    return Tableau(a, b, c, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
+    return Tableau(a, np.linalg.inv(a), b, c, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
 
 
 class Collocation(NamedTuple):
@@ -207,12 +208,24 @@ def _moved(chain: Any, method: Collocation, room: Room, sweep: int, h: float) ->
 
 
 @fill(do.finish, object)
-def _finish(chain: Any, method: Collocation, room: Room, before: Phase, h: float) -> None:
+def _finish(chain: Any, work: Any, method: Collocation, room: Room, before: Phase, h: float) -> None:
     rule, moves = method.tableau, room.moves
     if chain.load.spent.size > 0:
         for i in range(rule.b.size):
             combine(rule.a[i], room.v, h, moves[i])
             do.spend(chain, before, room.times[i], h * rule.b[i], moves[i], room.v[i], 1.0)
+    if do.driven(chain.load):
+        do.bases(chain, work, moves, room.stages.c)
+        for i in range(rule.b.size):
+            gained, p = room.force[i], room.p[i]
+            do.pullback(chain, work, before, room.times[i], moves[i], room.stages.c[i], p, gained)
+            for row in range(p.shape[0]):
+                for k in range(p.shape[1]):
+                    gained[row, k] *= h
+                    for j in range(rule.b.size):
+                        gained[row, k] += rule.inverse[i, j] * (room.p[j, row, k] - before.pi[row, k])
+                    gained[row, k] *= rule.b[i]
+            do.react(chain.load, gained, p)
 
 
 @fill(do.room, Collocation, _nrt=True)
@@ -258,7 +271,7 @@ def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Ph
         do.forwards(chain, work, c, p, v)
         moved = do.moved(chain, method, room, sweep, h)
         sweep += 1
-    do.finish(chain, method, room, before, h)
+    do.finish(chain, work, method, room, before, h)
     move = moves[0]
     combine(rule.b, v, h, move)
     advance(before, move, 1.0, after)

@@ -30,8 +30,8 @@ class Midpoint(OneStep):
         (I + h^2/4 C^T S C) p = pi_n - h/2 C^T S q_n.
 
     A sweep solves it and evaluates C again at the new midpoint. The energy is exact after any number of sweeps, since H is
-    quadratic and both equations have the same C (with motors or viscosity of bending, which are taken where the last sweep began,
-    once the sweeps have converged). The step is the midpoint rule, and reversible, once the sweeps have converged.
+    quadratic and both equations have the same C (with viscosity of bending, which is taken where the last sweep began, once the
+    sweeps have converged). The step is the midpoint rule, and reversible, once the sweeps have converged.
 
     If V is not quadratic, the secant of the step replaces S, and the energy is exact only once the sweeps have converged. The
     matrix then affects only their convergence, and the one of the first sweep is used for all sweeps of a step. (Measured on rods
@@ -88,10 +88,8 @@ class Midpoint(OneStep):
                 break
         work.spend(system.load, t + 0.5 * h, h, z, move, 2 / h * move)
         if system.load is not None and system.load.axles:
-            c = system.basis(system.moved(shape, move))
-            velocity = system.forward(c, p)
-            f = system.load.applied(t + 0.5 * h, z.hi + (z.lo + move), velocity)
-            pull = system.back(c, system.mean_force(system.secant(shape, h * velocity)) - f)
+            f = system.load.applied(t + 0.5 * h, z.hi + (z.lo + move), 2 / h * move)
+            pull = system.back(c, system.mean_force(system.secant(shape, 2 * move)) - f)
             work.react(system.load, 2 * (p - z.pi) + h * pull, p)
         work.gradients += sweep
         work.solves += sweep
@@ -147,6 +145,13 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
             change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
             sweep += 1
         do.spend(chain, now, time + 0.5 * tau, tau, move, move, 2 / tau)
+        if do.driven(chain.load):
+            gained = work.rhs
+            do.mean_pullback(chain, work, now, time + 0.5 * tau, move, work.c, p, gained)
+            for row in range(p.shape[0]):
+                for i in range(p.shape[1]):
+                    gained[row, i] = 2 * (p[row, i] - now.pi[row, i]) + tau * gained[row, i]
+            do.react(chain.load, gained, p)
         time += tau
         solves += sweep
         unconverged = max(unconverged, stuck(method, sweep))

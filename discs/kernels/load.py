@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from discs.kernels import protocol as do
 from discs.kernels.bends import NO_BENDS, Bends, bend, spent_by_bends, stiffen_bends
 from discs.kernels.compiled import fill, part
+from discs.kernels.limits import HELD
 from discs.kernels.shared import column
 
 
@@ -23,8 +24,9 @@ class Linear(NamedTuple):
     constant, damping, stiffness : (rows, n). level : (rows,), of a row: 3 if it has stiffness, otherwise 2 if it has damping,
     otherwise 1 if it has a constant, otherwise 0. viscosity : (columns, n + 1), of the rates of theta and phi, link j before disc
     j; B v is the difference of neighbours. patterns : (K, rows, n). pushed : (K, rows), whether a pattern has entries in a row.
-    times : (M,), increasing. values : (M, K), signals at these times. near : (1,), how far a time may be from one of them. bends :
-    see `discs.kernels.bends`. spent : (4,), work and dissipated energy since the last call from Python, each with its lost digits.
+    times : (M,), increasing. values : (M, K + A), signals and rates of motors at these times. near : (1,), how far a time may be
+    from one of them. bends : see `discs.kernels.bends`. spent : (4,), work and dissipated energy since the last call from Python,
+    each with its lost digits. axles : (A, 2), row and disc of the angles that motors drive, see `discs.loads.motor`.
     """
 
     constant: NDArray
@@ -39,16 +41,23 @@ class Linear(NamedTuple):
     near: NDArray
     bends: Bends
     spent: NDArray
+    axles: NDArray
 
 
 NONE = np.empty((0, 0))
 FEW, NO_LEVEL, NO_PATTERNS, UNPUSHED = np.empty(0), np.empty(0, int), np.empty((0, 0, 0)), np.empty((0, 0), bool)
-UNLOADED = Linear(NONE, NONE, NONE, NO_LEVEL, NONE, NO_PATTERNS, UNPUSHED, FEW, NONE, FEW, NO_BENDS, FEW)
+NO_AXLES = np.empty((0, 2), int)
+UNLOADED = Linear(NONE, NONE, NONE, NO_LEVEL, NONE, NO_PATTERNS, UNPUSHED, FEW, NONE, FEW, NO_BENDS, FEW, NO_AXLES)
 
 
 @fill(do.loaded, Linear)
 def _loaded(load):
     return load.constant.size > 0
+
+
+@fill(do.driven, Linear)
+def _driven(load):
+    return load.axles.size > 0
 
 
 @part
@@ -102,6 +111,15 @@ def _push(load, state, t, move, c, p, factor, g):
                     to[i] += signal * a[i] * pattern[i]
 
 
+@fill(do.hold, Linear)
+def _hold(load, t, c, p, factor, g):
+    place = at(load, t) if load.axles.size > 0 else -1
+    for m in range(load.axles.shape[0]):
+        row, i = load.axles[m, 0], load.axles[m, 1]
+        rate = load.values[place, load.patterns.shape[0] + m] if place >= 0 else np.nan
+        g[column(row), i] += factor * c[row, i] * (HELD * (rate - c[row, i] * p[column(row), i]))
+
+
 @fill(do.guide, Linear)
 def _guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
     for row in range(load.constant.shape[0]):
@@ -116,6 +134,10 @@ def _guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
         for i in range(last + 1):
             to[i] += d * a[i] * a[i] * (links[i] + links[i + 1])
             beside[i] -= d * links[i + 1] * a[i] * a[i + 1 if i < last else 0]
+    for m in range(load.axles.shape[0]):
+        row, i = load.axles[m, 0], load.axles[m, 1]
+        to = turn if column(row) else roll
+        to[i] += c[row, i] * c[row, i] * (d * HELD)
 
 
 @fill(do.stiffen, Linear)
@@ -158,3 +180,10 @@ def _spend(load, state, t, weight, move, v, scale):
                     work += signal * pattern[i] * rate[i]
     book(load.spent, 0, weight * scale * work)
     book(load.spent, 2, weight * scale * scale * dissipated)
+
+
+@fill(do.react, Linear)
+def _react(load, gained, p):
+    for m in range(load.axles.shape[0]):
+        turn, i = column(load.axles[m, 0]), load.axles[m, 1]
+        book(load.spent, 0, gained[turn, i] * p[turn, i])

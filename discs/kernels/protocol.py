@@ -25,7 +25,15 @@ def basis(chain, work, move, c):
 
 @stub
 def pullback(chain, work, state, t, move, c, p, g):
-    """g = C^T (grad V - f) after a move from the base, the positions of `state`, with this C; f at the time t and v = C p."""
+    """g = C^T (grad V - f) after a move from the base, the positions of `state`, with this C; f at the time t and v = C p.
+
+    f is without what motors do.
+    """
+
+
+@stub
+def mean_pullback(chain, work, state, t, move, c, p, g):
+    """g as by `pullback`, with the mean of grad V over a step of which `move` is the half."""
 
 
 @stub
@@ -127,7 +135,7 @@ def moved(chain, method, room, sweep, h):
 
 
 @stub
-def finish(chain, method, room, before, h):
+def finish(chain, work, method, room, before, h):
     """After the last sweep of a step from `before`: book the work of loads, at the positions and velocities of the last stages."""
 
 
@@ -237,6 +245,21 @@ def loaded(load):
 @stub
 def push(load, state, t, move, c, p, factor, g):
     """g += factor C^T f, with f after a move from the positions of `state`, at the time t and v = C p."""
+
+
+@stub
+def driven(load):
+    """Whether there are motors."""
+
+
+@stub
+def hold(load, t, c, p, factor, g):
+    """g += factor C^T f with f of what stands for motors in linear systems, see `discs.loads.motor`."""
+
+
+@stub
+def react(load, gained, p):
+    """Book the work of motors, whose torques changed the momenta by `gained` while the mean momenta were p."""
 
 
 @stub

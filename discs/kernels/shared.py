@@ -183,8 +183,27 @@ def _forwards(chain, work, c, p, v):
 def _forces(chain, work, state, t, moves, c, p, g):
     for i in range(p.shape[0]):
         do.pullback(chain, work, state, t[i], moves[i], c[i], p[i], g[i])
+        do.hold(chain.load, t[i], c[i], p[i], -1.0, g[i])
+
+
+# Loads without motors, and without more than diagonals and what is beside them
 
 
 @fill(do.stiffen, object)
 def _stiffen(load, state, t, move, c, d, g, matrix):
+    pass
+
+
+@fill(do.driven, object)
+def _driven(load):
+    return False
+
+
+@fill(do.hold, object)
+def _hold(load, t, c, p, factor, g):
+    pass
+
+
+@fill(do.react, object)
+def _react(load, gained, p):
     pass

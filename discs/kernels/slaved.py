@@ -146,15 +146,26 @@ def _gradient(chain, work, move, g):
             to[i] = x[i] - x[i + 1]
 
 
-@fill(do.pullback, Slaved)
-def _pullback(chain, work, state, t, move, c, p, g):
+@part
+def pulled(chain, work, before, state, t, move, c, p, g):
+    """g = C^T (mean grad V - f), of a step from the links `before`, with the links after the move in its middle."""
     moved(chain, work.base, move, work.links, 3)
-    do.tension(chain.links, chain.ends, work.links, work.links, work.tension)
+    do.tension(chain.links, chain.ends, before, work.links, work.tension)
     x, y, z = work.tension
     cx, cy, ct, to = c[0], c[1], c[2], g[0]
     for i in range(to.size):
         to[i] = cx[i] * (x[i] - x[i + 1]) + cy[i] * (y[i] - y[i + 1]) + ct[i] * (z[i] - z[i + 1])
     do.push(chain.load, state, t, move, c, p, -1.0, g)
+
+
+@fill(do.pullback, Slaved)
+def _pullback(chain, work, state, t, move, c, p, g):
+    pulled(chain, work, work.links, state, t, move, c, p, g)
+
+
+@fill(do.mean_pullback, Slaved)
+def _mean_pullback(chain, work, state, t, move, c, p, g):
+    pulled(chain, work, work.base, state, t, move, c, p, g)
 
 
 @fill(do.sweep, Slaved)
@@ -183,6 +194,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
     if do.loaded(chain.load):
         forward(c, p, work.step, half)
         do.push(chain.load, state, t + half, work.step, c, p, half, work.rhs)
+        do.hold(chain.load, t + half, c, p, half, work.rhs)
     do.guide(chain.load, c, half, half * half, m.a, m.u, m.a, m.u)
     do.stiffen(chain.load, state, t + half, work.step, c, half, half * half, m)
     factor(chain, m)

@@ -175,6 +175,13 @@ def _pullback(chain, work, state, t, move, c, p, g):
     do.push(chain.load, state, t, move, c, p, -1.0, g)
 
 
+@fill(do.mean_pullback, Steered)
+def _mean_pullback(chain, work, state, t, move, c, p, g):
+    pull(chain, work, move, True)
+    pulled(work, c, g)
+    do.push(chain.load, state, t, move, c, p, -1.0, g)
+
+
 @fill(do.sweep, Steered)
 def _sweep(chain, work, state, t, h, p, move, first):
     n = p.shape[1]
@@ -188,6 +195,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
         for i in range(n):
             b[row, i] = pi[row, i] - p[row, i] - half * b[row, i]
     do.push(chain.load, state, t + half, work.step, c, p, half, b)
+    do.hold(chain.load, t + half, c, p, half, b)
     if first:  # later sweeps of a step use the same matrix, see `discs.integrators.midpoint`
         assemble(chain, work, c, 1.0, half * half, m)
         do.guide(chain.load, c, half, half * half, m.d[0], m.o[0], m.d[2], m.o[3])

@@ -51,9 +51,9 @@ class OnRod(ABC):
         return checks.number(f"{name} of {self._name}", value)
 
     def _disc(self, chain: Discs, at: float) -> int:
-        """The disc nearest to a place along the rod."""
+        """The disc nearest to a place along the rod, which may be beyond its end by rounding."""
         place = checks.number(f"at of {self._name}", at)
-        if not 0 <= place <= chain.length:
+        if not abs(place - 0.5 * chain.length) <= 0.5 * chain.length * (1 + 1e-12):
             raise ValueError(f"at of {self._name} must be on the rod, from 0 to {chain.length:g}; got {place:g}")
         apart = np.abs(chain.s - place)
         return int(np.argmin(np.minimum(apart, chain.length - apart) if chain.ends == "ring" else apart))

@@ -178,19 +178,35 @@ class Linear(Load):
         parts = self.constant, self.damping, self.stiffness
         level = np.max([number * part.any(axis=1) for number, part in enumerate(parts, start=1)], axis=0)
         pushed: Any = patterns.any(axis=2)
-        return load.Linear(*parts, level, links, patterns, pushed, few, none, np.empty(1), bends, few)
+        return load.Linear(*parts, level, links, patterns, pushed, few, none, np.empty(1), bends, few, load.NO_AXLES)
+
+    @property
+    def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]
+        return tuple((drive.signal, drive.name) for drive in self.drives)
 
     def timed(self, times: Float, h: float) -> Any:
-        """For each run and call anew, with sums of its own for work and dissipated energy."""
-        if self.conservative:
-            return self.parameters
-        filled = self.parameters._replace(spent=np.zeros(4))
-        if not self.drives:
-            return filled
+        return tabled(self, times, h)
+
+
+def tabled(load: Load, times: Float, h: float) -> Any:
+    """Parameters of a load for steps h, with a table of its signals at these times and sums of their own for its work."""
+    if load.conservative:
+        return load.parameters
+    given: dict[str, Float] = {"spent": np.zeros(4)}
+    if load.signals:
         times = np.sort(times)
         times = times[np.diff(times, prepend=-np.inf) > 0]
-        values = np.stack([signals.values(drive.signal, times, drive.name) for drive in self.drives], axis=1)
-        return filled._replace(times=times, values=values, near=np.array([NEAR * h + 1e-14 * abs(times[-1])]))
+        values = np.stack([signals.values(signal, times, name) for signal, name in load.signals], axis=1)
+        given |= {"times": times, "values": values, "near": np.array([NEAR * h + 1e-14 * abs(times[-1])])}
+    return with_arrays(load.parameters, **given)
+
+
+def with_arrays(parameters: Any, **given: Float) -> Any:
+    """Parameters of a compiled load with some arrays of its linear part replaced."""
+    if not hasattr(parameters, "linear"):
+        return parameters._replace(**given)
+    linear = parameters.linear._replace(**given)
+    return parameters._replace(linear=linear, spent=linear.spent)
 
 
 def _at(drive: Drive, t: float) -> float:

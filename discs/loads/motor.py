@@ -10,18 +10,19 @@ and exact for Radau methods, whose last stage is there.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from discs import checks
 from discs.arrays import Float
+from discs.kernels.limits import HELD
 from discs.loads import signals
 from discs.loads.binding import Discs, OnRod, spread
+from discs.loads.linear import Linear, tabled, with_arrays
 from discs.loads.signals import Signal
-from discs.skew import Load
-
-HELD = 1e60  # any other entry of a row is below the rounding of this
+from discs.skew import Load, Parameters
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Motor(OnRod):
     about: str = "roll"
 
     def on(self, chain: Discs) -> "Held":
-        return Held((Axle(self._row(chain, self.about), self._disc(chain, self.at), self.signal),), spread(chain, {}))
+        return Held((Axle(self._row(chain, self.about), self._disc(chain, self.at), self.signal),), Linear(spread(chain, {})))
 
     @property
     def signal(self) -> Signal:
@@ -66,20 +67,19 @@ def change(rate: Signal, t: float, duration: float) -> float:
 
 
 class Held(Load):
-    """Motors, and another load or None. `force` has dampers in the place of motors, `applied` is the force of the other load.
+    """Motors, and another load. `force` has dampers in the place of motors, `applied` is the force of the other load.
 
     Attributes
     ----------
     axles : the driven angles. where : (rows, discs), their index in q.
     """
 
-    def __init__(self, axles: tuple[Axle, ...], nothing: Float, other: Load | None = None) -> None:
-        self.axles, self._other, self._nothing = axles, other, nothing
+    def __init__(self, axles: tuple[Axle, ...], other: Load) -> None:
+        self.axles, self._other = axles, other
         self.where = np.array([axle.row for axle in axles]), np.array([axle.disc for axle in axles])
-        self.damping, self.stiffness = (nothing if other is None else getattr(other, name) for name in ("damping", "stiffness"))
-        self.damping = self.damping.copy()
+        self.damping, self.stiffness = other.damping.copy(), other.stiffness
         self.damping[self.where] += HELD
-        self.viscosity, self.section = (None if other is None else getattr(other, name) for name in ("viscosity", "section"))
+        self.viscosity, self.section = other.viscosity, other.section
 
     def rates(self, t: float) -> Float:
         """The given rates at a time, (motors,)."""
@@ -90,7 +90,7 @@ class Held(Load):
         return np.array([change(axle.rate, t, duration) for axle in self.axles])
 
     def applied(self, t: float, q: Float, v: Float) -> Float:
-        return self._nothing if self._other is None else self._other.force(t, q, v)
+        return self._other.force(t, q, v)
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found = np.array(self.applied(t, q, v), dtype=float)
@@ -98,14 +98,26 @@ class Held(Load):
         return found
 
     def potential(self, t: float, q: Float) -> float:
-        return 0.0 if self._other is None else self._other.potential(t, q)
+        return self._other.potential(t, q)
 
     def driven(self, t: float, q: Float) -> float:
-        return 0.0 if self._other is None else self._other.driven(t, q)
+        return self._other.driven(t, q)
 
     def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
-        return None if self._other is None else self._other.bands(t, q, c, d, g)
+        return self._other.bands(t, q, c, d, g)
 
     def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
         """Without that of the motors, see `discs.integrators.base.Work.react`."""
-        return (0.0, 0.0) if self._other is None else self._other.power(t, q, v)
+        return self._other.power(t, q, v)
+
+    @cached_property
+    def parameters(self) -> Parameters:
+        other = self._other.parameters
+        return None if other is None else with_arrays(other, axles=np.array([(axle.row, axle.disc) for axle in self.axles]))
+
+    @property
+    def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]
+        return *self._other.signals, *((axle.rate, "Motor") for axle in self.axles)
+
+    def timed(self, times: Float, h: float) -> Parameters:
+        return tabled(self, times, h)

@@ -1,7 +1,14 @@
-"""Loads of one's own, in NumPy: a potential in the plane, and any force. Runs with them take the plain engine."""
+"""Loads of one's own: a potential in the plane, and any force.
 
+Runs with functions in NumPy take the plain engine. Functions that numba compiles (`numba.njit`) run on the compiled engine too; the
+first run of a process compiles them (some seconds), and the kernels of such loads are kept on disc as all others are.
+"""
+
+import sys
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +26,7 @@ class Potential(OnRod):
     Parameters
     ----------
     V : function of the contact points x, y (n,) that returns (n,).
-    gradient : function of the same that returns (dV/dx, dV/dy), each (n,).
+    gradient : function of the same that returns (dV/dx, dV/dy), each (n,). One that numba compiles runs on the compiled engine.
     """
 
     V: Callable[[Float, Float], Float]
@@ -32,32 +39,65 @@ class Potential(OnRod):
         return _Field(self, chain)
 
 
-class _Field(Load):
+def for_kernels(make: str, *functions: Any) -> tuple[Any, Any] | None:
+    """Force and power by the function of this name in `discs.kernels.functions`; None unless numba compiles all functions."""
+    given = [function for function in functions if function is not None]
+    if "numba" not in sys.modules:
+        return None
+    from numba.core.dispatcher import Dispatcher
+    from numba.core.errors import NumbaError
+
+    if not all(isinstance(function, Dispatcher) for function in given):
+        return None
+    from discs.kernels import functions as kernels
+
+    pair: tuple[Any, Any] = getattr(kernels, make)(*functions)
+    try:
+        kernels.addresses((pair,))
+    except NumbaError:
+        return None
+    return pair
+
+
+class OwnLoad(Load):
+    """A load of functions. w : (n,), shares of the discs."""
+
+    def __init__(self, of: Any, chain: Discs) -> None:
+        self._of, self.w = of, chain.w
+        self.damping = self.stiffness = spread(chain, {})
+
+    @property
+    @abstractmethod
+    def functions(self) -> tuple[Any, Any] | None:
+        """Force and power for compiled code, or None."""
+
+
+class _Field(OwnLoad):
     conservative = True
 
-    def __init__(self, of: Potential, chain: Discs) -> None:
-        self._of, self._w = of, chain.w
-        self.damping = self.stiffness = spread(chain, {})
+    @property
+    def functions(self) -> tuple[Any, Any] | None:
+        return for_kernels("of_gradient", self._of.gradient)
 
     def potential(self, t: float, q: Float) -> float:
         values = checks.called("V of Potential", self._of.V, q[0], q[1], where=f" at t = {t:g}")
-        return float(self._w @ self._checked("V", values, q, t))
+        return float(self.w @ self._checked("V", values, q, t))
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         f = np.zeros_like(q)
         found = checks.called("gradient of Potential", self._of.gradient, q[0], q[1], where=f" at t = {t:g}")
         if not isinstance(found, tuple | list | np.ndarray) or len(found) != 2:
             raise ValueError(f"gradient of Potential must return dV/dx and dV/dy; got {checks.shown(found)} at t = {t:g}")
-        f[0], f[1] = (-self._w * self._checked("gradient", part, q, t) for part in found)
+        f[0], f[1] = (-self.w * self._checked("gradient", part, q, t) for part in found)
         return f
 
     def _checked(self, name: str, values: ArrayLike, q: Float, t: float) -> Float:
         """Values (n,), finite where the positions are."""
-        found = checks.array(f"{name} of Potential", values, f"{self._w.size} numbers")
-        if found.shape not in ((), self._w.shape) or (np.isfinite(q).all() and not np.isfinite(found).all()):
-            need = f"{name} of Potential must be finite numbers of shape {self._w.shape}"
+        found = checks.array(f"{name} of Potential", values, f"{self.w.size} numbers")
+        if found.shape not in ((), self.w.shape) or (np.isfinite(q).all() and not np.isfinite(found).all()):
+            need = f"{name} of Potential must be finite numbers of shape {self.w.shape}"
             raise ValueError(f"{need}; got {checks.shown(values)} at t = {t:g}")
-        return np.broadcast_to(found, self._w.shape)
+        return np.broadcast_to(found, self.w.shape)
 
 
 @dataclass(frozen=True)
@@ -69,6 +109,9 @@ class Custom(OnRod):
     force : function of t, q and v, positions and velocities (rows, n) with rows x, y, theta (and phi), that returns the generalised
         forces (rows, n) on the discs; not per length.
     power : function of the same that returns the rate of its work; None for the sum of force times v.
+
+    If numba compiles both, a run is compiled, by kernels that are the same for all functions and cached on disc; the functions are
+    compiled once in each process. A force that raises, or is not finite, stops the run.
     """
 
     force: Callable[[float, Float, Float], Float]
@@ -80,10 +123,10 @@ class Custom(OnRod):
         return _Own(self, chain)
 
 
-class _Own(Load):
-    def __init__(self, of: Custom, chain: Discs) -> None:
-        self._of = of
-        self.damping = self.stiffness = spread(chain, {})
+class _Own(OwnLoad):
+    @property
+    def functions(self) -> tuple[Any, Any] | None:
+        return for_kernels("of_force", self._of.force, self._of.power)
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         given = checks.called("force of Custom", self._of.force, t, q, v, where=f" at t = {t:g}")

@@ -1,20 +1,23 @@
 """The sum of several loads."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from discs.arrays import Float
 from discs.loads.bends import Bends
-from discs.loads.linear import Linear
+from discs.loads.linear import Linear, tabled
 from discs.loads.motor import Held
-from discs.skew import Load
+from discs.loads.own import OwnLoad
+from discs.loads.signals import Signal
+from discs.skew import Load, Parameters
 
 
 @dataclass(frozen=True, eq=False)
 class Total(Load):
-    """The sum of loads, of which at most one is linear."""
+    """The sum of loads, of which at most one is linear. It has a compiled form if numba compiles the functions of the others."""
 
     loads: tuple[Load, ...]
 
@@ -44,6 +47,27 @@ class Total(Load):
         found: Float = np.sum([load.force(t, q, v) for load in self.loads], axis=0)
         return found
 
+    @cached_property
+    def _linear(self) -> Linear:
+        return next((load for load in self.loads if isinstance(load, Linear)), Linear(np.zeros_like(self.damping)))
+
+    @cached_property
+    def parameters(self) -> Parameters:
+        linear, own = self._linear.parameters, [load for load in self.loads if isinstance(load, OwnLoad)]
+        functions = [load.functions for load in own]
+        if linear is None or None in functions or any(not isinstance(load, Linear | OwnLoad) for load in self.loads):
+            return None
+        from discs.kernels import functions as kernels  # numba is slow to import
+
+        return kernels.Functions(linear, own[0].w, *kernels.addresses(tuple(functions)), linear.spent)
+
+    @property
+    def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]
+        return self._linear.signals
+
+    def timed(self, times: Float, h: float) -> Parameters:
+        return tabled(self, times, h)
+
 
 def _present(loads: tuple[Load, ...] | list[Linear], name: str) -> Float | None:
     """The sum of an attribute of loads, None if none has it."""
@@ -66,12 +90,12 @@ def total(loads: tuple[Load, ...]) -> Load | None:
     if not loads:
         return None
     if motors := [load for load in loads if isinstance(load, Held)]:
-        rest = total(tuple(load for load in loads if not isinstance(load, Held)))
-        return Held(tuple(axle for load in motors for axle in load.axles), np.zeros_like(motors[0].damping), rest)
+        rest = total(tuple(load for load in loads if not isinstance(load, Held))) or Linear(np.zeros_like(motors[0].damping))
+        return Held(tuple(axle for load in motors for axle in load.axles), rest)
     others = tuple(load for load in loads if not isinstance(load, Linear))
     if linear := [load for load in loads if isinstance(load, Linear)]:  # one, as rest shapes of several loads are one strain
         others = (_linear(linear), *others)
-    return others[0] if len(others) == 1 else Total(others)
+    return others[0] if len(others) == 1 and not isinstance(others[0], OwnLoad) else Total(others)
 
 
 def _linear(loads: list[Linear]) -> Linear:

@@ -14,6 +14,7 @@ class Stats(TypedDict, total=False):
     order: int | None  # None where the solver varies it
     settings: str  # the integrator with all its settings, as Python writes it
     engine: str  # "compiled" or "plain"
+    plain_because: str  # why it is "plain"
     want: list[str]
     dt: float  # time step
     dt_suggested: bool  # whether dt was chosen by `suggest_dt`

@@ -19,8 +19,6 @@ NOTICE = 2.0  # seconds of compiling after which a notice is printed; reading ke
 _PREPARED: set[tuple[type, ...]] = set()
 WATCHED = ("looks", "passed", "doubted", "defects", "places")  # attributes of a `Watch` that a restart needs
 CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown between calls, Ctrl-C is polled in every sweep
-
-
 TABLED = 20_000  # steps of one compiled call whose loads have tables of their signals
 
 
@@ -188,6 +186,8 @@ class March:
             if self.work.unconverged > stuck:
                 self._remember(self.memory, 1, stuck)
             time = self.step * self.h + tau
+            if self.parameters is not None and self.system.load is not None and not np.isfinite(frame.rate).all():
+                self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, Work())  # as in `_accept`
             by_velocity = self.explicit or self.work.unconverged > stuck
             lost = frame.lost if frame.lost >= 0 else self._lost(self.memory, frame, tau, by_velocity)
             self._check_heading(lost, self.step, time, self.memory)
@@ -253,11 +253,11 @@ class March:
         """Count and check compiled steps from the memory `previous`; returns how many they are."""
         watch = self.watch
         self.work.add(tally)
-        if tally.lost >= 0:
-            previous, _ = twin.march(
-                self.system, self.parameters, previous, self.step * self.h, self.h, tally.steps - 1, self.bound
-            )
         if tally.lost >= 0 or tally.blown:
+            done, start = tally.steps - 1, self.step * self.h
+            previous, _ = twin.march(self.system, self.parameters, previous, start, self.h, done, self.bound)
+            if self.system.load is not None:  # a bad value of a user's function is NaN in compiled steps; plain ones raise
+                self.integrator.advance(self.system, previous, start + done * self.h, self.h, Work())
             self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
         if watch is not None:
             if watch.doubted:

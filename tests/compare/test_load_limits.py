@@ -9,7 +9,7 @@ from compare.load_limits import AT_AN_END, LOADS, ON_A_RING, OWN_HEADINGS, scene
 from continuum import Rod, Scene, solve
 from continuum.scenes import PAPER
 from discs import simulate
-from discs.loads import Damping, Force, Motor, Rest, Slope, Spring, Torque, signals
+from discs.loads import Damping, Force, Rest, Slope, Spring, Torque, signals
 
 pytestmark = pytest.mark.slow
 
@@ -24,8 +24,7 @@ def test_loaded_discs_tend_to_the_loaded_field(name):
     A held end, where the line starts straight: the part of first order of plain springs is small here.
     """
     scene = scenes()[name]
-    slow = any(isinstance(load, Motor) for load in scene.loads)  # on the plain engine
-    for found in study(scene, (33, 65, 129) if slow else (65, 129, 257), 1e-6):
+    for found in study(scene, (65, 129, 257), 1e-6):
         worst = found.error.max(axis=1)
         order = np.log(worst[1] / worst[2]) / np.log(found.k[1] / found.k[2])
         exact = 1.95, 2.05

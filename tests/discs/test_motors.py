@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discs import Chain, Midpoint, Problem, State, simulate
+from discs import Chain, Gauss4, Gauss6, Midpoint, Problem, Radau3, Radau5, State, Suzuki4, simulate
+from discs.integrators import METHODS
+from discs.kernels import compiled
 from discs.loads import Damping, Motor, Slope, Torque, signals
 from discs.mechanics.lagrange import frames as coordinates
 from discs.mechanics.lagrange import lagrange_dalembert
@@ -23,7 +25,7 @@ def driven(model, n: int = 6) -> Problem:
     problem = uneven(n, model)
     omega = np.array(problem.initial.omega)
     omega[2], omega[-1] = 0.4, 0.0
-    motors = [Motor(lambda t: 0.4 + 0.5 * np.sin(RATE * t), 2 * problem.chain.k), Motor(0.0, (n - 1) * problem.chain.k)]
+    motors = [Motor(lambda t: 0.4 + 0.5 * np.sin(RATE * t), 2 * problem.chain.k), Motor(0.0, problem.chain.s[-1])]
     phi_rate = problem.initial.phi_rate
     if model.law == "steered":
         phi_rate = np.array(phi_rate) * np.ones(n)
@@ -48,7 +50,7 @@ def by_multipliers(problem: Problem):
 
 
 @models([KINDS[0], KINDS[1], KINDS[4]])
-def test_motors_move_discs_as_the_saddle_point_says(model):
+def test_motors_move_discs_as_the_saddle_point_says(model, kernels_as_python):
     problem = driven(model)
     q, ground, torque = by_multipliers(problem)
     for method, dt, close, near in (("midpoint", 0.01, 1e-3, 0.05), ("gauss6", 0.05, 3e-6, 2e-3)):
@@ -58,18 +60,58 @@ def test_motors_move_discs_as_the_saddle_point_says(model):
         np.testing.assert_allclose(run.contact_force[-1], ground, atol=near, err_msg=method)
         off = run.energy - problem.energy() - run.work + run.dissipated
         assert abs(off).max() < (1e-11 if method == "midpoint" or problem.system.quadratic else 1e-6) * abs(run.energy).max()
-        assert run.stats["engine"] == "plain"
+        assert run.stats["engine"] == "compiled"
         assert run.reaction.shape == (2, len(problem.system.load.axles))
 
 
-def test_the_row_of_a_motor_is_replaced_to_the_last_bits():
+def agree(problem: Problem, method, dt: float = 0.02, close: float = 1e-13):
+    """Both engines, at frames at and between steps, every motor among the loads of both."""
+    one, other = (simulate(problem, method, dt, [0.13, 1.0], progress=False, engine=e) for e in ("compiled", "plain"))
+    assert [run.stats["engine"] for run in (one, other)] == ["compiled", "plain"]
+    for name in (*problem.system.rows, "omega", "energy", "work", "dissipated", "reaction"):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0, atol=close, err_msg=f"{method}, {name}")
+    assert np.abs(one.work).max() > 1e-2
+
+
+@pytest.mark.parametrize(("model", "degree"), [(model, 1) for model in KINDS] + [(model, 2) for model in KINDS[3:]])
+def test_motors_run_compiled(model, degree, kernels_as_python):
+    """Converged, and after two sweeps, where all parts of a sweep matter."""
+    problem = driven(model, 6 if model.ends == "ring" else 7)
+    if degree == 2:
+        loads = tuple(replace(load, torsion=0.0) if isinstance(load, Damping) else load for load in problem.loads)
+        problem = replace(problem, chain=replace(problem.chain, degree=2), loads=loads)
+    few = {"sweeps": 2, "tolerance": 0}
+    for method in (Midpoint(), Midpoint(**few), Suzuki4(), Gauss6(), Gauss4(**few), Radau3(), Radau5(**few)):
+        agree(problem, method)
+
+
+@pytest.mark.parametrize(("model", "method"), [(KINDS[0], "gauss6"), (KINDS[4], "midpoint")])
+def test_motors_take_the_kernels_of_runs_without_loads(model, method):
+    """Numba compiles nothing for them; chunks of steps have tables of their own."""
+    problem = driven(model)
+    simulate(replace(problem, loads=()), method, 0.05, 2, progress=False)
+    said: list[bool] = []
+    with compiled.compiling(lambda: said.append(True), 0.0):
+        agree(problem, METHODS[method]())
+    assert not said
+
+
+def test_the_row_of_a_motor_is_replaced_to_the_last_bits(kernels_as_python):
     """Its angle is the midpoint sum of its rate; a held disc does not turn at all."""
     problem = driven(KINDS[0])
-    run = simulate(problem, "midpoint", 0.05, 2, progress=False)
     t = 0.05 * (np.arange(20) + 0.5)
     turned = 0.05 * np.sum(0.4 + 0.5 * np.sin(RATE * t))
-    assert run.theta[-1, 2] - problem.initial.theta[2] == pytest.approx(turned, rel=1e-14)
-    assert run.theta[-1, -1] == problem.initial.theta[-1]
+    for engine in ("compiled", "plain"):
+        run = simulate(problem, "midpoint", 0.05, 2, progress=False, engine=engine)
+        assert run.theta[-1, 2] - problem.initial.theta[2] == pytest.approx(turned, rel=1e-14)
+        assert run.theta[-1, -1] == problem.initial.theta[-1]
+
+
+def test_the_balance_of_a_motor_is_exact_after_any_number_of_sweeps(kernels_as_python):
+    problem = driven(KINDS[1])
+    for engine in ("compiled", "plain"):
+        run = simulate(problem, Midpoint(sweeps=1, tolerance=0), 0.1, 4, progress=False, engine=engine)
+        assert abs(run.energy - problem.energy() - run.work + run.dissipated).max() < 1e-14 * abs(run.energy).max()
 
 
 def test_a_motor_pulls_a_row_of_discs_steadily():
@@ -78,7 +120,7 @@ def test_a_motor_pulls_a_row_of_discs_steadily():
         n=5, length=2.0, density=1.3, spin_inertia=0.6, torsion_stiffness=0.0, bending_stiffness=0.0, radius=0.7, rolling="unit"
     )
     problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 2.0, (Motor(lambda t: 0.6 * t, 1.0),))
-    run = simulate(replace(problem, initial=problem.initial), Midpoint(tolerance=1e-15), 0.01, 5, progress=False)
+    run = simulate(problem, Midpoint(tolerance=1e-15), 0.01, 5, progress=False)
     inertia = (0.6 + 1.3 * 0.7**2) * chain.w[2]
     moved = run.omega[:, 2]
     np.testing.assert_allclose(moved, 0.6 * run.t, atol=1e-12)

@@ -1,0 +1,25 @@
+"""Which engine a run takes, and why."""
+
+from discs import checks
+from discs.integrators import Integrator
+from discs.loads.own import OwnLoad
+from discs.problem import Problem
+
+ENGINES = ("compiled", "plain")
+
+
+def plain_because(problem: Problem, integrator: Integrator, engine: str) -> str:
+    """Why a run takes the plain engine, for `stats`; empty if it is compiled. ValueError for an unknown engine."""
+    if checks.choice("engine", engine, ENGINES) == "plain":
+        return "it was asked for"
+    if not integrator.compiles:
+        return f"{integrator.name!r} has no compiled form"
+    if problem.system.parameters is not None:
+        return ""
+    for given, load in zip(problem.loads, problem.bound, strict=True):
+        name = type(given).__name__
+        if isinstance(load, OwnLoad) and load.functions is None:
+            return f"the functions of {name} are not compiled by numba, as with numba.njit"
+        if not isinstance(load, OwnLoad) and load.parameters is None:
+            return f"{name} has no compiled form here"
+    return "the laws of this chain have no compiled form"
