@@ -130,6 +130,7 @@ class SkewGradient(ABC):
     scale : (rows,), unit of each coordinate for tolerances: a length, or a radian.
     quadratic : whether V is quadratic; secants then do not depend on the step.
     load : f, or None for none; then nothing is computed for it.
+    lanes : parameters for compiled steps in lanes; None for none.
     """
 
     n: int
@@ -137,6 +138,7 @@ class SkewGradient(ABC):
     scale: Float
     quadratic: bool
     load: Load | None = None
+    lanes: Parameters = None
 
     @abstractmethod
     def shape(self, hi: Float, lo: Float | None = None) -> Shape:

@@ -20,6 +20,7 @@ import numpy as np
 from discs.arrays import Float, Int
 from discs.chains import stencils
 from discs.chains.chain import Chain
+from discs.chains.links import LinearCurvature
 from discs.chains.rolling_discs import RollingDiscs, folded
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Load, Parameters, Placed, Secant
@@ -141,3 +142,12 @@ class SlavedSystem(RollingDiscs):
         from discs.kernels import slaved  # numba is slow to import
 
         return slaved.parameters(self._chain, self.weights, self.scale, self._shift, *parts)
+
+    @cached_property
+    def lanes(self) -> Parameters:
+        """The same parameters in lanes (`discs.kernels.slaved_lanes`), for methods that take them; None for few discs."""
+        if self.load is not None or not isinstance(self._springs, LinearCurvature):
+            return None
+        from discs.kernels import slaved_lanes, slaved_sweeps  # noqa: F401, the sweeps too
+
+        return slaved_lanes.arranged(self.parameters) if self.n >= slaved_lanes.MANY else None

@@ -201,6 +201,7 @@ class FixedStep(Integrator):
     """
 
     adaptive: ClassVar[bool] = False
+    in_lanes: ClassVar[bool] = False
 
     @property
     def parameters(self) -> Parameters:
@@ -210,6 +211,11 @@ class FixedStep(Integrator):
     @property
     def compiles(self) -> bool:
         return self.parameters is not None
+
+    @final
+    def twin_of(self, system: RollingDiscs, chain: Parameters) -> Parameters:
+        """What the compiled twin is given for `system.parameters`: those in lanes, if it takes them and there are."""
+        return chain if not self.in_lanes or system.lanes is None else system.lanes
 
     @final
     def march(
@@ -235,7 +241,7 @@ class FixedStep(Integrator):
             times = np.add.outer(starts, h * np.array([0.0, *self.parameters.nodes]))
             chain = chain._replace(load=system.load.timed(times.ravel(), abs(h)))
         state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta (n,) are (1, n) in compiled code
-        found = driver.march(self.parameters, chain, state, t, h, steps, bound, *looks)
+        found = driver.march(self.parameters, self.twin_of(system, chain), state, t, h, steps, bound, *looks)
         tally = Tally(*found)
         if system.load is not None and not system.load.conservative:
             tally = tally._replace(spent=chain.load.spent)

@@ -33,6 +33,7 @@ class Composition(OneStep, ABC):
     preserves: ClassVar[str] = Midpoint.preserves
     stability_limit: ClassVar[float] = np.inf
     takes_motors: ClassVar[bool] = True
+    in_lanes: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         cls.back = -min(cls.fractions)

@@ -58,6 +58,7 @@ class Midpoint(OneStep):
     reference: ClassVar[str] = "Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.2"
     stability_limit: ClassVar[float] = np.inf
     takes_motors: ClassVar[bool] = True
+    in_lanes: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checks.iteration(self.sweeps, self.tolerance)

@@ -9,7 +9,7 @@ import numpy as np
 from discs.kernels import protocol as do
 from discs.kernels.compiled import interrupted, kernel, part
 from discs.kernels.limits import TURNED
-from discs.kernels.shared import ahead, columns, forward
+from discs.kernels.shared import ahead, columns, disc_by_disc, forward
 from discs.skew import Phase
 
 POLLED = 16  # steps between two polls of Ctrl-C; sweeps poll it themselves
@@ -27,12 +27,12 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
     The steps whose numbers are in `looks` (m,) are looked at, see `discs.running.step_error`: `defects` (m, 2, rows) and `places`
     are filled in, and `passed` counts the looks. The steps end before one whose defect exceeds `limit` (`doubted`).
     """
-    work, room = do.workspace(chain), do.room(method, chain, state)
-    before, after = state, do.like(state)
+    before = do.enter(chain, state)
+    work, room, after = do.workspace(chain), do.room(method, chain, before), do.like(before)
     rows, n = before.hi.shape
     few, vanishing = looks.size > 0 and looks[0] < 3, do.vanishing(chain)
     half, c, slope = np.empty((rows, n * vanishing)), np.empty((rows, n * (few or vanishing))), np.zeros((2, n))
-    g = np.empty((columns(rows), n * few))
+    g, kicked = np.empty((columns(rows), n * few)), np.empty((rows, n * few))
     gradients, solves, unconverged, lost, passed, doubted, blown = 0, 0, 0, -1, 0, False, False
     due = looks[0] - first if looks.size else -1  # steps of this call
     spent, kept = chain.load.spent, np.empty(chain.load.spent.size)
@@ -49,7 +49,7 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
             place = places[passed % places.shape[0]]
             if step == due - 3:
                 place[:] = 0.0
-            add_up(before.hi, -1.0 if step == due - 3 else 3.0 if step == due - 2 else -3.0, place)
+            add_up(chain, before.hi, -1.0 if step == due - 3 else 3.0 if step == due - 2 else -3.0, place)
         for j in range(spent.size):
             kept[j] = spent[j]
         new = do.step(method, chain, work, room, before, after, t + step * h, h)
@@ -57,10 +57,11 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
             return -1, gradients, solves, unconverged, -1, passed, doubted, False
         if step + 1 == due:
             place = places[passed % places.shape[0]]
-            add_up(after.hi, 1.0, place)
+            add_up(chain, after.hi, 1.0, place)
             if few:
-                do.kick(before, after, chain, work, t + step * h, h, c, g, place)
-            if judge(before.hi, after.hi, place, defects[passed]) > limit:
+                do.kick(before, after, chain, work, t + step * h, h, c, g, kicked)
+                disc_by_disc(chain, kicked, place)
+            if judge(chain, before.hi, after.hi, place, defects[passed]) > limit:
                 steps, doubted = step, True
                 for j in range(spent.size):
                     spent[j] = kept[j]
@@ -80,32 +81,33 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
         if lost >= 0 or blown:
             steps = step + 1
             break
-    if steps % 2:
-        do.take(before, state)
+    do.leave(chain, before, state)
     return steps, gradients, solves, unconverged, lost, passed, doubted, blown
 
 
 @part
-def add_up(q, factor, total):
-    """total += factor q, both (rows, n)."""
+def add_up(chain, q, factor, total):
+    """total += factor q, both (rows, n), q in the order of the chain."""
     for row in range(q.shape[0]):
         x, to = q[row], total[row]
         for i in range(to.size):
-            to[i] += factor * x[i]
+            to[i] += factor * x[do.place(chain, i)]
 
 
 @part
-def judge(start, end, place, defect):
+def judge(chain, start, end, place, defect):
     """The largest relative defect of a step; infinite if a heading turns by more than TURNED, as whole turns do not show.
 
-    place : third differences, (rows, n); then positions at the `end` of the step. defect : (2, rows), defects and sizes, filled in.
+    start, end : positions in the order of the chain. place : third differences, (rows, n); then positions at the `end` of the step.
+    defect : (2, rows), defects and sizes, filled in.
     """
     worst = 0.0
     for row in range(end.shape[0]):
         off, size, turned, before, after, to = 0.0, 0.0, 0.0, start[row], end[row], place[row]
         for i in range(to.size):
-            off, size, turned = max(off, abs(to[i])), max(size, abs(after[i])), max(turned, abs(after[i] - before[i]))
-            to[i] = after[i]
+            j = do.place(chain, i)
+            off, size, turned = max(off, abs(to[i])), max(size, abs(after[j])), max(turned, abs(after[j] - before[j]))
+            to[i] = after[j]
         defect[0, row], defect[1, row] = off / 12, size
         worst = np.inf if row == 3 and turned > TURNED else max(worst, defect[0, row] / (size if size > 0 else 1.0))
     return worst

@@ -14,6 +14,21 @@ def workspace(chain):
 
 
 @stub
+def place(chain, i):
+    """The entry of disc i in the arrays of a chain."""
+
+
+@stub
+def enter(chain, state):
+    """A state in the order of the chain: a new one, or itself if that is the order of the discs."""
+
+
+@stub
+def leave(chain, own, state):
+    """Copy a state in the order of the chain to one in the order of the discs."""
+
+
+@stub
 def settle(chain, work, hi, lo):
     """Make hi + lo the base position."""
 
@@ -205,7 +220,7 @@ def kick(before, after, chain, work, t, h, c, g, defect):
 
 @stub
 def contact(law, radius, half, x, y):
-    """e = f J (a, b) and |e|^2 for r' = half (x, y): returns a, b, f, |e|^2."""
+    """e = f J (a, b) and |e|^2 for r' = half (x, y): returns a, b, f, |e|^2. radius, x, y are numbers or `vectors`."""
 
 
 @stub

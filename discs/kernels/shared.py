@@ -31,6 +31,14 @@ def copy(a, to):
 
 
 @part
+def disc_by_disc(chain, a, to):
+    """Copy a (rows, n) in the order of a chain to `to`, in that of the discs."""
+    for row in range(to.shape[0]):
+        for i in range(to.shape[1]):
+            to[row, i] = a[row, do.place(chain, i)]
+
+
+@part
 def forward(c, p, v, tau=1.0):
     """v = tau C p."""
     for row in range(c.shape[0]):
@@ -165,6 +173,21 @@ def ahead(chain, work, state, h, c, half, slope):
     do.settle(chain, work, state.hi, state.lo)
     do.lost(chain, work, slope)
     return lost
+
+
+@fill(do.place, object)
+def _place(chain, i):
+    return i
+
+
+@fill(do.enter, object, _nrt=True)
+def _enter(chain, state):
+    return state
+
+
+@fill(do.leave, object)
+def _leave(chain, own, state):
+    do.take(own, state)
 
 
 @fill(do.bases, object)

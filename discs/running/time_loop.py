@@ -83,7 +83,8 @@ class March:
 
     def _prepare(self, quiet: bool) -> None:
         """Compile the kernels (once per machine) or read them from disc (once per process)."""
-        key = (type(self.integrator), *map(type, self.parameters or ()))  # the types of the chain's laws and load too
+        chain = self.parameters if self.twin is None else self.twin.twin_of(self.system, self.parameters)
+        key = (type(self.integrator), type(chain), *map(type, chain or ()))  # the types of the chain's laws and load too
         if key in _PREPARED:
             return
         from discs.kernels.compiled import compiling, uncached

@@ -17,4 +17,4 @@ def find(curvature: str, stretching: object) -> type[LinkLaw]:
     return law
 
 
-__all__ = ["CURVATURE", "LinkLaw", "find"]
+__all__ = ["CURVATURE", "LinearCurvature", "LinkLaw", "find"]

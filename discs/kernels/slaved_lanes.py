@@ -1,0 +1,212 @@
+"""Many discs with slaved headings, in lanes (`discs.kernels.lanes`): parameters, workspace, links.
+
+`discs.kernels.slaved_sweeps` has their sweeps; `discs.kernels.slaved` is the same disc by disc, for few discs and other methods.
+
+A link is in the row of the disc after it.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discs.kernels import protocol as do
+from discs.kernels.compiled import fill, part
+from discs.kernels.lanes import HALO, Matrix, Order, join, order, workspace
+from discs.kernels.limits import LOST_HEADING
+from discs.kernels.shared import disc_by_disc
+from discs.kernels.slaved import Slaved
+from discs.kernels.slaved_matrix import GHOST, RING
+from discs.kernels.vectors import LANES, after, before, load, store
+from discs.skew import Phase
+
+MANY = 64  # discs from which lanes are used; they need rows of two discs behind `Order.first`
+
+
+class Laned(NamedTuple):
+    """Parameters of `Slaved` in lanes, (n',). bend, torsion : (n' + 2 HALO,). springs : (2,), bending of consistent ends."""
+
+    order: Order
+    radius: NDArray
+    mass: NDArray
+    spin: NDArray
+    bend: NDArray
+    torsion: NDArray
+    hessian: NDArray
+    twist: NDArray
+    corner: NDArray
+    springs: NDArray
+    scale: NDArray
+    shift: NDArray
+    k: float
+    ends: int
+    rolling: Any
+    load: Any
+
+
+def arranged(chain: Slaved) -> Laned:
+    """The parameters in lanes, for linear curvature."""
+    n, ring = chain.radius.size, chain.ends == RING
+    lanes, links = order(n), chain.links
+
+    def put(values: NDArray, rest: float = 0.0, halo: int = 0) -> NDArray:
+        to = np.full((*values.shape[:-1], LANES * lanes.rows + 2 * halo), rest)
+        to[..., halo + lanes.places] = values[..., :n]
+        if halo:
+            join(lanes, ring, to)
+        return to
+
+    bend, springs, torsion = links.bend.copy(), np.zeros(2), links.torsion.copy()
+    if chain.ends == GHOST:
+        springs[:], bend[[0, -1]] = bend[[0, -1]], 0.0
+    if not ring:
+        torsion[[0, n]] = 0.0
+    return Laned(
+        lanes,
+        put(chain.radius),
+        put(chain.weights[0]),
+        put(chain.weights[2], 1.0),
+        put(bend, halo=HALO),
+        put(torsion, halo=HALO),
+        put(links.hessian),
+        put(links.twist),
+        links.corner,
+        springs,
+        chain.scale,
+        chain.shift,
+        chain.k,
+        chain.ends,
+        chain.rolling,
+        chain.load,
+    )
+
+
+class Workspace(NamedTuple):
+    """Workspace, (3, n' + 2 HALO): base, links of the base position; links, of a moved one; half, half a step. c : (3, n' + HALO).
+
+    b : (1, n'). spare : (LANES,).
+    """
+
+    base: NDArray
+    links: NDArray
+    half: NDArray
+    c: NDArray
+    b: NDArray
+    spare: NDArray
+    matrix: Matrix
+
+
+@fill(do.workspace, Laned, _nrt=True)
+def _workspace(chain):
+    n = chain.radius.size
+    base, links, half = np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO))
+    return Workspace(base, links, half, np.zeros((3, n + HALO)), np.zeros((1, n)), np.empty(LANES), workspace(chain.order))
+
+
+@fill(do.place, Laned)
+def _place(chain, i):
+    return chain.order.places[i]
+
+
+@fill(do.enter, Laned, _nrt=True)
+def _enter(chain, state):
+    n = chain.radius.size
+    own = Phase(np.zeros((3, n)), np.zeros((3, n)), np.zeros((1, n)))
+    for array, to in ((state.hi, own.hi), (state.lo, own.lo), (state.pi, own.pi)):
+        for row in range(array.shape[0]):
+            for i in range(array.shape[1]):
+                to[row, chain.order.places[i]] = array[row, i]
+    return own
+
+
+@fill(do.leave, Laned)
+def _leave(chain, own, state):
+    for array, to in ((own.hi, state.hi), (own.lo, state.lo), (own.pi, state.pi)):
+        disc_by_disc(chain, array, to)
+
+
+@fill(do.settle, Laned)
+def _settle(chain, work, hi, lo):
+    rows, first, ring = chain.order.rows, chain.order.first, chain.ends == RING
+    for axis in range(3):
+        x, e, to = hi[axis], lo[axis], work.base[axis]
+        last, lost = before(load(x, LANES * (rows - 1))), before(load(e, LANES * (rows - 1)))
+        for i in range(0, x.size, LANES):
+            here, low = load(x, i), load(e, i)
+            store(to, HALO + i, (here - last) + (low - lost))
+            last, lost = here, low
+        for i in range(0, LANES * (first + 1), LANES):
+            to[HALO + i] = 0.0
+        if ring:
+            i, end = LANES * first, x.size - 1
+            to[HALO + i] = (x[i] - x[end]) + (e[i] - e[end]) + chain.shift[axis]
+        join(chain.order, ring, to)
+
+
+@part
+def close_ends(chain, d):
+    """Set the links before the first disc and after the last one, and those before `Order.first`, whose headings are then those
+    of disc 0."""
+    rows, first = chain.order.rows, HALO + LANES * chain.order.first
+    last, end = HALO + LANES * rows - 1, HALO + LANES * rows
+    for axis in range(2):
+        x = d[axis]
+        store(x, end, after(load(x, HALO)))
+        second, third = x[HALO + chain.order.places[1]], x[HALO + chain.order.places[2]]
+        if chain.ends == RING:
+            x[end + LANES - 1] = x[first]
+        elif chain.ends == GHOST:
+            x[first] = 3 * (second - third) + x[HALO + chain.order.places[3]]
+            x[end + LANES - 1] = 3 * (x[last] - x[last - LANES]) + x[last - 2 * LANES]
+        else:
+            x[first] = 2 * second - third
+            x[end + LANES - 1] = 2 * x[last] - x[last - LANES]
+        for i in range(first - LANES, HALO - 1, -LANES):
+            x[i] = x[first] + second - x[i + LANES]
+
+
+@part
+def moved(chain, base, move, d):
+    """d = the links (2, n' + 2 HALO) after a move."""
+    for axis in range(2):
+        x, from_, to = move[axis], base[axis], d[axis]
+        last = before(load(x, x.size - LANES))
+        for i in range(0, x.size, LANES):
+            here = load(x, i)
+            store(to, HALO + i, load(from_, HALO + i) + (here - last))
+            last = here
+        if chain.ends == RING:
+            i = LANES * chain.order.first
+            to[HALO + i] = from_[HALO + i] + (x[i] - x[x.size - 1])
+    close_ends(chain, d)
+
+
+@fill(do.spend, Laned)
+def _spend(chain, state, t, weight, move, v, scale):
+    do.spend(chain.load, state, t, weight, move, v, scale)
+
+
+@fill(do.vanishing, Laned)
+def _vanishing(chain):
+    return do.vanishing(chain.rolling)
+
+
+@fill(do.lost, Laned)
+def _lost(chain, work, slope):
+    disc = -1
+    if not do.vanishing(chain.rolling):
+        return disc
+    d, half, worst, rows = work.base, 0.5 / chain.k, LOST_HEADING**2, chain.order.rows
+    for lane in range(LANES):
+        for row in range(chain.order.first if lane == 0 else 0, rows):
+            i = LANES * row + lane
+            j = HALO + i
+            ax, ay = slope[0, i], slope[1, i]
+            bx, by = (d[0, j] + d[0, j + LANES]) * half, (d[1, j] + d[1, j + LANES]) * half
+            mx, my = bx - ax, by - ay
+            part = min(max(-(ax * mx + ay * my) / max(mx * mx + my * my, 1e-300), 0.0), 1.0)
+            nearest = (ax + part * mx) ** 2 + (ay + part * my) ** 2
+            if nearest < worst:
+                worst, disc = nearest, rows * lane + row - chain.order.first
+            slope[0, i], slope[1, i] = bx, by
+    return disc

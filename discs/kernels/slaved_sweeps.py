@@ -1,0 +1,173 @@
+"""Sweeps of many discs with slaved headings, in lanes; see `discs.kernels.slaved_lanes`.
+
+Ghost links at free ends serve headings only; the springs of consistent ends act on the first and the last four discs by themselves.
+"""
+
+import numpy as np
+
+from discs.kernels import protocol as do
+from discs.kernels.compiled import fill, part
+from discs.kernels.lanes import HALO, factor, join, solve
+from discs.kernels.slaved_lanes import Laned, moved
+from discs.kernels.slaved_matrix import GHOST, RING
+from discs.kernels.vectors import LANES, after, larger, largest, load, store, zero
+
+END = 2.0, -5.0, 4.0, -1.0  # r_-1 - 2 r_0 + r_1 with the ghost disc r_-1 of a consistent end, by its first four discs
+
+
+@part
+def contact(chain, i, x, y):
+    """C of the discs i ... i + LANES - 1, for the sums of their two links."""
+    a, b, e, square = do.contact(chain.rolling, load(chain.radius, i), 0.5 / chain.k, x, y)
+    t = 1.0 / np.sqrt(load(chain.spin, i) + load(chain.mass, i) * square)
+    e = e * t
+    return -b * e, a * e, t
+
+
+@fill(do.basis, Laned)
+def _basis(chain, work, move, c):
+    moved(chain, work.base, move, work.links)
+    (dx, dy, _), (cx, cy, ct) = work.links, c
+    x, y = load(dx, HALO), load(dy, HALO)
+    for i in range(0, chain.radius.size, LANES):
+        next_x, next_y = load(dx, HALO + LANES + i), load(dy, HALO + LANES + i)
+        a, b, t = contact(chain, i, x + next_x, y + next_y)
+        store(cx, i, a)
+        store(cy, i, b)
+        store(ct, i, t)
+        x, y = next_x, next_y
+
+
+@part
+def frozen(chain, work, tau, p, c):
+    """c = C for the moved links, and work.half = tau C p."""
+    dx, dy, cx, cy, ct, half = work.links[0], work.links[1], c[0], c[1], c[2], work.half
+    x, y = load(dx, HALO), load(dy, HALO)
+    for i in range(0, chain.radius.size, LANES):
+        j = HALO + i
+        next_x, next_y = load(dx, j + LANES), load(dy, j + LANES)
+        a, b, t = contact(chain, i, x + next_x, y + next_y)
+        r = tau * load(p, i)
+        store(cx, i, a)
+        store(cy, i, b)
+        store(ct, i, t)
+        store(half[0], j, a * r)
+        store(half[1], j, b * r)
+        store(half[2], j, t * r)
+        x, y = next_x, next_y
+
+
+@part
+def link(base, move, j):
+    """A row of links after a move."""
+    return load(base, j) + (load(move, j) - load(move, j - LANES))
+
+
+@part
+def bent(bend, base, move, j, last):
+    """A row of links, and the moments of the discs between it and the row before."""
+    found = link(base, move, j)
+    return found, load(bend, j - LANES) * (found - last)
+
+
+@part
+def pulled(chain, work, c, g):
+    """g = C^T grad V after the move work.half."""
+    base, half, bend, torsion = work.base, work.half, chain.bend, chain.torsion
+    bx, by, bt, vx, vy, vt, cx, cy, ct = base[0], base[1], base[2], half[0], half[1], half[2], c[0], c[1], c[2]
+    for axis in range(3):
+        join(chain.order, chain.ends == RING, half[axis])
+    link_x, before_x = bent(bend, bx, vx, HALO, link(bx, vx, LANES))
+    link_y, before_y = bent(bend, by, vy, HALO, link(by, vy, LANES))
+    link_x, moment_x = bent(bend, bx, vx, HALO + LANES, link_x)
+    link_y, moment_y = bent(bend, by, vy, HALO + LANES, link_y)
+    tension_x, tension_y, tension = before_x - moment_x, before_y - moment_y, load(torsion, HALO) * link(bt, vt, HALO)
+    for i in range(0, g.size, LANES):
+        j = HALO + 2 * LANES + i
+        link_x, after_x = bent(bend, bx, vx, j, link_x)
+        link_y, after_y = bent(bend, by, vy, j, link_y)
+        next_x, next_y, next_ = moment_x - after_x, moment_y - after_y, load(torsion, j - LANES) * link(bt, vt, j - LANES)
+        pull = load(cx, i) * (tension_x - next_x) + load(cy, i) * (tension_y - next_y) + load(ct, i) * (tension - next_)
+        store(g, i, pull)
+        moment_x, moment_y, tension_x, tension_y, tension = after_x, after_y, next_x, next_y, next_
+    if chain.ends == GHOST:
+        pull_ends(chain, work, c, g)
+
+
+@part
+def pull_ends(chain, work, c, g):
+    """Add the forces of the bending springs of consistent ends to g."""
+    base, half, last = work.base, work.half, chain.order.n - 1
+    for end in range(2):
+        for axis in range(2):
+            moment = 0.0
+            for k, share in enumerate((-2.0, 3.0, -1.0)):  # of the three links from the end inwards
+                i = HALO + chain.order.places[k + 1 if end == 0 else last - k]
+                j = HALO + chain.order.places[k if end == 0 else last - k - 1]
+                moment += share * (base[axis, i] + (half[axis, i] - half[axis, j]))
+            for k, share in enumerate(END):
+                i = chain.order.places[k if end == 0 else last - k]
+                g[i] += c[axis, i] * (share if end == 0 else -share) * chain.springs[end] * moment
+
+
+@part
+def assemble(chain, c, one, g, m):
+    """Entries of `one` I + g C^T (grad^2 V) C; fills in the last two rows of c, (3, n' + HALO)."""
+    lanes, a, u, w, n = chain.order, m.a, m.u, m.w, m.a.size
+    s0, s1, s2, t0, t1 = chain.hessian[0], chain.hessian[1], chain.hessian[2], chain.twist[0], chain.twist[1]
+    cx, cy, ct = c[0], c[1], c[2]
+    for axis in range(3):
+        x = c[axis]
+        for k in range(2):
+            store(x, n + LANES * k, after(load(x, LANES * k)))
+            x[n + LANES * (k + 1) - 1] = x[lanes.places[k]]
+    x, y, t, x1, y1, t1_ = load(cx, 0), load(cy, 0), load(ct, 0), load(cx, LANES), load(cy, LANES), load(ct, LANES)
+    for i in range(0, n, LANES):
+        x2, y2, t2 = load(cx, i + HALO), load(cy, i + HALO), load(ct, i + HALO)
+        store(a, i, one + g * (load(s0, i) * (x * x + y * y) + load(t0, i) * (t * t)))
+        store(u, i, g * (load(s1, i) * (x * x1 + y * y1) + load(t1, i) * (t * t1_)))
+        store(w, i, g * (load(s2, i) * (x * x2 + y * y2)))
+        x, y, t, x1, y1, t1_ = x1, y1, t1_, x2, y2, t2
+    if chain.ends == GHOST:
+        for end in range(2):
+            i, j = lanes.places[0 if end == 0 else lanes.n - 4], lanes.places[3 if end == 0 else lanes.n - 1]
+            m.corner[end] = g * (chain.corner[end] * (cx[i] * cx[j] + cy[i] * cy[j]))
+
+
+@fill(do.sweep, Laned)
+def _sweep(chain, work, state, t, h, p, move, first):
+    c, q, b, half, start = work.c, p[0], work.b[0], 0.5 * h, state.pi[0]
+    moved(chain, work.base, move, work.links)
+    frozen(chain, work, half, q, c)
+    pulled(chain, work, c, b)
+    for i in range(0, b.size, LANES):
+        store(b, i, load(start, i) - load(q, i) - half * load(b, i))
+    for i in range(chain.order.first):
+        b[LANES * i] = 0.0
+    assemble(chain, c, 1.0, half * half, work.matrix)
+    factor(chain.order, chain.ends == RING, chain.ends == GHOST, work.matrix)
+    solve(chain.order, chain.ends == RING, chain.ends == GHOST, work.matrix, b)
+    cx, cy, ct, x, y, theta = c[0], c[1], c[2], move[0], move[1], move[2]
+    far_x, far_y, far = zero(), zero(), zero()
+    for i in range(0, b.size, LANES):
+        r = load(q, i) + load(b, i)
+        store(q, i, r)
+        r = half * r
+        new_x, new_y, new = load(cx, i) * r, load(cy, i) * r, load(ct, i) * r
+        far_x = larger(abs(new_x - load(x, i)), far_x)
+        far_y = larger(abs(new_y - load(y, i)), far_y)
+        far = larger(abs(new - load(theta, i)), far)
+        store(x, i, new_x)
+        store(y, i, new_y)
+        store(theta, i, new)
+    scale, spare = chain.scale, work.spare
+    return max(largest(far_x, spare) / scale[0], largest(far_y, spare) / scale[1], largest(far, spare) / scale[2])
+
+
+@fill(do.pullback, Laned)
+def _pullback(chain, work, state, t, move, c, p, g):
+    for axis in range(3):
+        x, to = move[axis], work.half[axis]
+        for i in range(0, x.size, LANES):
+            store(to, HALO + i, load(x, i))
+    pulled(chain, work, c, g[0])

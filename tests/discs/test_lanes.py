@@ -1,0 +1,144 @@
+"""One chain in lanes: vectors, the linear system against NumPy, runs of 64 discs or more against the plain engine."""
+
+import numpy as np
+import pytest
+
+from compare import lump
+from continuum import untwisting_rod
+from discs import Midpoint, SimulationError, simulate
+from discs.kernels import lanes, vectors
+from discs.kernels.compiled import jit
+from discs.kernels.slaved_lanes import MANY
+from discs.kernels.vectors import LANES, after, before, larger, largest, load, store, zero
+from tests.conftest import SLAVED, Model, models, uneven
+from tests.discs.test_kernels import CLOSE, dense_banded
+from tests.discs.test_simulate import collapsing
+
+pytestmark = pytest.mark.slow
+
+SIZES = [64, 65, 66, 70, 72, 73, 129]  # with 0, 7, 6, 2, 0, 7, 7 entries without a disc
+
+
+def formula(a, b, out):
+    v, w = load(a, 0), load(b, 1)
+    store(out, 0, (2.0 * v - w) / (1.0 + abs(w)) + np.sqrt(v * v))
+    store(out, LANES, before(-v))
+    store(out, 2 * LANES, after(v) + zero())
+    store(out, 3 * LANES, larger(w, v))
+    return largest(v, out[4 * LANES :])
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_vectors(compiled):
+    a, b = np.random.default_rng(5).standard_normal((2, LANES + 1))
+    out, v, w = np.zeros(5 * LANES), a[:LANES], b[1:]
+    assert (jit(formula) if compiled else formula)(a, b, out) == v.max()
+    np.testing.assert_allclose(out[:LANES], (2 * v - w) / (1 + abs(w)) + abs(v), rtol=4e-16)
+    expected = np.roll(-v, 1), np.roll(v, -1), np.maximum(v, w)
+    np.testing.assert_array_equal(out[LANES : 4 * LANES].reshape(3, LANES), expected)
+
+
+def test_the_larger_entry_is_never_not_a_number():
+    """A sweep that changes a disc by NaN is noticed by the energy, as one disc by disc."""
+    out = np.full(5 * LANES, np.nan)
+    jit(formula)(np.ones(LANES), np.full(LANES + 1, np.nan), out)
+    np.testing.assert_array_equal(out[3 * LANES : 4 * LANES], 1.0)
+
+
+def test_vectors_are_computed_all_lanes_at_once():
+    compiled = jit(formula)
+    compiled(*np.ones((2, LANES + 1)), np.zeros(5 * LANES))
+    (assembly,) = compiled.inspect_asm().values()
+    if "xmm" not in assembly:
+        pytest.skip("not a processor of this kind")
+    assert "divpd" in assembly
+    assert "divsd" not in assembly
+
+
+def test_elimination_in_lanes():
+    @jit
+    def solve(order, ring, corners, m, b):
+        lanes.factor(order, ring, corners, m)
+        lanes.solve(order, ring, corners, m, b)
+
+    rng = np.random.default_rng(4)
+    for n in [*SIZES, 1000]:
+        order = lanes.order(n)
+        for ring, corners in ((False, False), (False, True), (True, False)):
+            m, b, entries = lanes.workspace(order), np.zeros(LANES * order.rows), rng.standard_normal((4, n))
+            entries[0] += 12
+            for array, values in zip((m.a, m.u, m.w, b), entries, strict=True):
+                array[:] = np.nan if array is m.u or array is m.w else 1.0  # what belongs to no disc
+                array[order.places] = values
+            a, u, w, right = entries
+            m.corner[:] = rng.standard_normal(2) * corners
+            matrix = dense_banded(a, u, w, m.corner)
+            for i, j, value in ((n - 1, 0, u[-1]), (n - 2, 0, w[-2]), (n - 1, 1, w[-1])) if ring else ():
+                matrix[i, j] = matrix[j, i] = value
+            for array in (m.u, m.w):
+                array[np.isnan(array)] = 0.0
+            solve(order, ring, corners, m, b)
+            np.testing.assert_allclose(b[order.places], np.linalg.solve(matrix, right), atol=1e-14, err_msg=f"{n}, {ring}")
+
+
+def apart(a, b, rows=("x", "y", "theta", "omega", "energy")):
+    """The largest difference of two runs in each of some rows, relative to the largest value."""
+    return [np.abs(getattr(a, row) - getattr(b, row)).max() / np.abs(getattr(b, row)).max() for row in rows]
+
+
+@models(SLAVED)
+@pytest.mark.filterwarnings("ignore:.*too long for this motion")
+def test_lanes_and_the_plain_engine_agree(model):
+    """Converged, and after one sweep, where the matrix matters; `step_error` compares positions in the order of discs."""
+    for n in SIZES:
+        problem = uneven(n, model)
+        for method in (Midpoint(), Midpoint(sweeps=1, tolerance=0)):
+            a, b = (simulate(problem, method, 0.05, [0.1, 0.175], (), False, engine) for engine in ("compiled", "plain"))
+            assert max(apart(a, b)) < CLOSE, (n, method)
+            assert abs(a.stats["solves"] - b.stats["solves"]) <= 1
+            assert a.stats["step_error"] == pytest.approx(b.stats["step_error"], rel=1e-9)
+
+
+@pytest.mark.parametrize("n", [4097, 16385])
+def test_many_discs_in_lanes(n):
+    problem = lump(untwisting_rod(duration=0.05), n, "consistent")
+    a, b = (simulate(problem, Midpoint(), 0.025, 1, progress=False, engine=engine) for engine in ("compiled", "plain"))
+    assert max(apart(a, b, ("x", "y", "theta"))) < 1e-12  # sweeps stop at 1e-12
+    assert abs(a.energy[-1] - problem.energy()) < 4e-13  # a sum of 16385 terms: as measured disc by disc, too
+
+
+def test_the_number_of_discs_decides(monkeypatch):
+    """Fewer discs, and discs with loads, run disc by disc; compositions of midpoint steps take lanes too."""
+    few, many = (uneven(n, Model("springs", "field")) for n in (MANY - 1, MANY))
+    assert few.system.lanes is None
+    one = simulate(many, "suzuki4", 0.05, 1, progress=False)
+    monkeypatch.setitem(vars(many.system), "lanes", None)
+    other = simulate(many, "suzuki4", 0.05, 1, progress=False)
+    assert 0 < max(apart(one, other)) < CLOSE  # not the same kernel
+
+
+def test_a_lost_heading_is_that_of_its_disc():
+    """All discs of a ring that collapses lose their headings at about the same time."""
+    problem, _ = collapsing(70)
+    found = []
+    for engine in ("compiled", "plain"):
+        with pytest.raises(SimulationError, match="lost its heading") as caught:
+            simulate(problem, Midpoint(), 0.01, 1, progress=False, engine=engine)
+        found.append((caught.value.step, caught.value.slope))
+        assert 0 <= caught.value.disc < 70
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+
+
+def test_steps_in_lanes_go_on_from_any_state_to_the_same_bits():
+    problem, method = uneven(67, Model("ring", "unit")), Midpoint()
+    system, start = problem.system, problem.start()
+    whole, _ = method.march(system, system.parameters, start, 0.0, 0.02, 5, np.inf)
+    part, _ = method.march(system, system.parameters, start, 0.0, 0.02, 2, np.inf)
+    part, _ = method.march(system, system.parameters, part, 0.04, 0.02, 3, np.inf)
+    for one, other in zip(whole, part, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert not np.array_equal(start.hi, whole.hi)
+
+
+def test_vectors_have_eight_lanes():
+    assert vectors.LANES == 8  # `Order.first` < 8 is at most the rows of 64 discs less two
