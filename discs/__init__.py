@@ -20,8 +20,8 @@ from discs.mechanics import MechanicalSystem
 from discs.mechanics.friction import first_slip, friction_needed
 from discs.mechanics.lagrange import lagrange_dalembert
 from discs.problem import Problem, State
+from discs.running.failure import SimulationError
 from discs.running.suggest import suggest_dt
-from discs.running.time_loop import SimulationError
 from discs.simulation import simulate
 from discs.solution import Solution
 

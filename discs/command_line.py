@@ -21,9 +21,9 @@ from discs.loads.tables import load_of_words
 from discs.mechanics import Trajectory
 from discs.problem import Problem
 from discs.running.engine import ENGINES
+from discs.running.failure import SimulationError
 from discs.running.frames import WANTS
 from discs.running.step_error import doubts
-from discs.running.time_loop import SimulationError
 from discs.simulation import simulate
 from discs.solution import Solution
 

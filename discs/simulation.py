@@ -54,8 +54,8 @@ def simulate(
     dt : time step, at most the duration; for SciPy's methods the longest step. None is `suggest_dt(problem, method)`.
     frames : number of frames, equally spaced over the duration, or their times, increasing. A frame between two steps is
         computed by a shorter step of its own, so frames never change the trajectory.
-    want : further quantities to record: "velocity", "slope", "contact_force", and those that the method offers (leapfrog:
-        "modified_energy").
+    want : further quantities to record: "velocity", "slope", "contact_force", "work_by_load" (`run.work_by_load`), and those that
+        the method offers (leapfrog: "modified_energy").
     progress : show a progress bar for runs of more than a second.
     tol : tolerance, instead of dt: steps are shortened until the errors of x, y, theta (and phi), relative to the largest value of
         each, are within it. A dictionary, as {"omega": 1e-4}, names the quantities; see `discs.running.tolerance`.
@@ -200,7 +200,7 @@ def _run(
     checked : estimate the error of the steps. more : further entries of `stats`. estimate : of the errors, if known.
     """
     want = () if want == () else wanted(want, integrator.offers)
-    because = plain_because(problem, integrator, engine)
+    because = plain_because(problem, integrator, engine, want)
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
@@ -238,7 +238,7 @@ def _run(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown or NO_BAR, record:
         if record.complete:
             return record.solution({})
-        march = March(problem, integrator, h, not because, not progress, watch)
+        march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)

@@ -101,6 +101,10 @@ class Solution(Result):
         energy - energy[0] = work - dissipated, to rounding for "midpoint", its compositions and the Gauss methods if V is
         quadratic, otherwise to the order of the method. Zeros without loads.
     balance : (F, 2), work and dissipated, as recorded; None if all loads are part of the energy.
+    work_by_load, dissipated_by_load : (F, L), the same of each of `problem.loads`, in their order: their sums over loads are those
+        of all, to rounding. Rest shapes that signals drive have an energy in common, which counts half for each. Want
+        "work_by_load"; runs then take the plain engine.
+    balance_by_load : (F, 2, L), both, as recorded.
     reaction : (F, motors), torque of each motor, about the axle or the vertical; None without motors.
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
     problem : the problem of discs; of a field by "richardson", the one on the finest mesh; otherwise None.
@@ -131,6 +135,7 @@ class Solution(Result):
     tension: Float | None = None
     modified_energy: Float | None = None
     balance: Float | None = None
+    balance_by_load: Float | None = None
     reaction: Float | None = None
     error_estimate: dict[str, float] | None = None
     problem: Problem | None = None
@@ -149,6 +154,23 @@ class Solution(Result):
     def dissipated(self) -> Float:
         """Energy that dampers took since the start, (F,)."""
         return np.zeros(self.t.size) if self.balance is None else self.balance[:, 1]
+
+    @property
+    def work_by_load(self) -> Float:
+        """The part of each load in `work`, (F, L). ValueError if it was not asked for."""
+        return self._by_load(0)
+
+    @property
+    def dissipated_by_load(self) -> Float:
+        """The part of each load in `dissipated`, (F, L). ValueError if it was not asked for."""
+        return self._by_load(1)
+
+    def _by_load(self, part: int) -> Float:
+        if self.balance_by_load is not None:
+            return self.balance_by_load[:, part]
+        if self.balance is None and self.problem is not None:
+            return np.zeros((self.t.size, len(self.problem.loads)))
+        raise ValueError('this run did not book what each load does: take simulate(..., want=("work_by_load",))')
 
     def __repr__(self) -> str:
         frames, n = self.x.shape

@@ -58,6 +58,7 @@ QUANTITIES = {
     "tension": Quantity(("link",), "mass length per time squared", "tension of the links"),
     "energy": Quantity((), "mass length squared per time squared", "kinetic and potential energy"),
     "balance": Quantity(("part",), "mass length squared per time squared", "work of loads, energy that dampers took"),
+    "balance_by_load": Quantity(("part", "load"), "mass length squared per time squared", "balance of each load"),
     "reaction": Quantity(("motor",), "mass length squared per time squared", "torques of motors"),
     "modified_energy": Quantity((), "mass length squared per time squared", "invariant of the two-step scheme"),
     "rolling_residual": Quantity((), "length per time", "largest |r. - e omega| over the discs"),

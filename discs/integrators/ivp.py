@@ -11,7 +11,7 @@ from discs import checks
 from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
-from discs.integrators.base import NOTHING, Frame, Integrator, Work
+from discs.integrators.base import Frame, Integrator, Work
 from discs.kernels.shared import columns
 from discs.skew import Parameters, Phase
 
@@ -113,7 +113,7 @@ class SolveIvp(Integrator, ABC):
         if hasattr(solver, "lu"):
             make = solver.lu
             solver.lu = lambda matrix: solvers.Factors(matrix, make)
-        return Course(f, solver, 0.0, z, np.zeros(2))
+        return Course(f, solver, 0.0, z, 0.0 * work.spent[::2], 0.0 * work.spent[::2])
 
     def advance(self, system: RollingDiscs, memory: "Course", t: float, h: float, work: Work) -> "Course":
         return memory.to(memory.time + h, work)
@@ -142,7 +142,7 @@ class Course:
     """A running SciPy solver and its interpolated state at a time.
 
     past, spent : (2,), work of loads and dissipated energy until the last step of the solver (one array for all states of it), and
-    until the time: integrals over the interpolated motion, by NODES in each step.
+    until the time: integrals over the interpolated motion, by NODES in each step. With `Work.shares` (2, 1 + L).
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class Course:
         time: float,
         z: Phase,
         past: Float,
-        spent: Float = NOTHING[::2],
+        spent: Float,
     ) -> None:
         self.f, self.solver, self.time, self.past, self.spent = f, solver, time, past, spent
         self.hi, self.lo, self.pi = z
@@ -160,17 +160,17 @@ class Course:
     def to(self, time: float, work: Work) -> "Course":
         """The same solver, stepped ahead as needed, and its state at a later time."""
         while self.solver.t < time:
-            self.past += self._spent(self.solver.t)
+            self.past += self._spent(self.solver.t, work)
             message = self.solver.step()
             if self.solver.status == "failed":
                 raise ArithmeticError(f"{type(self.solver).__name__} failed at t = {self.solver.t:g}: {message}")
         work.gradients, work.solves = self.solver.nfev, self.solver.nlu
         z = self.f.split(self.solver.dense_output()(time))
-        return Course(self.f, self.solver, time, z, self.past, self.past + self._spent(time))
+        return Course(self.f, self.solver, time, z, self.past, self.past + self._spent(time, work))
 
-    def _spent(self, end: float) -> Float:
-        """What loads do in the last step of the solver until a time, (2,): work and dissipated energy."""
-        load, system, start, found = self.f.system.load, self.f.system, self.solver.t_old, np.zeros(2)
+    def _spent(self, end: float, work: Work) -> Float:
+        """What loads do in the last step of the solver until a time, like `past`: work and dissipated energy."""
+        load, system, start, found = self.f.system.load, self.f.system, self.solver.t_old, 0.0 * self.past
         if load is None or load.conservative or start is None:
             return found
         motion = self.solver.dense_output()
@@ -178,7 +178,7 @@ class Course:
             t = start + 0.5 * (1 + node) * (end - start)
             z = self.f.split(motion(t))
             v = system.forward(system.basis(system.shape(z.hi)), z.pi)
-            found += 0.5 * weight * (end - start) * np.array(load.power(t, z.hi, v))
+            found += 0.5 * weight * (end - start) * work.power(load, t, z.hi, v)
         return found
 
 

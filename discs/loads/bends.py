@@ -104,12 +104,17 @@ class Bends:
         z, z1 = self._line(q)
         return float(self.stiffness @ (0.5 * np.abs(kappa * z) ** 2 - kappa * (z.conj() * z1).imag))
 
-    def force(self, kappa: Float, q: Float) -> Float:
-        """-grad U, (2, n)."""
+    def force(self, kappa: Float, q: Float, other: Float | None = None) -> Float:
+        """-grad U, (2, n). With `other`, one of the two factors kappa of kappa^2 in U is `other`."""
         _, _, slope, bend = self.stencil
         z, z1 = self._line(q)
-        moment = self.stiffness * kappa
-        return self._at_discs(bend * (1j * moment * z)[:, None] - slope * (moment * (kappa * z + 1j * z1))[:, None])
+        moment, other = self.stiffness * kappa, kappa if other is None else other
+        return self._at_discs(bend * (1j * moment * z)[:, None] - slope * (moment * (other * z + 1j * z1))[:, None])
+
+    def mutual(self, kappa: Float, q: Float, other: Float) -> float:
+        """U with one of the two factors kappa of kappa^2 replaced by `other`."""
+        z, z1 = self._line(q)
+        return float(self.stiffness @ (kappa * (0.5 * other * np.abs(z) ** 2 - (z.conj() * z1).imag)))
 
     def drag(self, q: Float, v: Float) -> Float:
         """The force of viscosity, (2, n)."""

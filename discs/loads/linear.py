@@ -142,6 +142,29 @@ class Linear(Load):
             work, dissipated = work + float(np.vdot(driven, v[:2])), dissipated + self.bends.dissipated(q, v)
         return work, dissipated
 
+    def powers(self, t: float, q: Float, v: Float) -> Float:
+        """The part of each drive in the work of `power`, (K,)."""
+        found = np.zeros(len(self.drives))
+        for k, drive in enumerate(self.drives):
+            signal = _at(drive, t)
+            found[k] = signal * np.vdot(drive.pattern, v)
+            if self.bends is not None and drive.curvature is not None:
+                both = self.bends.rest + self._curvature(t)
+                found[k] += np.vdot(self.bends.force(signal * drive.curvature, q, both), v[:2])
+        return found
+
+    def energies(self, t: float, q: Float) -> Float:
+        """The part of each drive in `driven`, (K,). What two drives have in common counts half for each."""
+        strains = 2 * self.strain + sum(_at(drive, t) * drive.strain for drive in self.drives if drive.strain is not None)
+        found = np.zeros(len(self.drives))
+        for k, drive in enumerate(self.drives):
+            signal = _at(drive, t)
+            if drive.strain is not None:
+                found[k] = signal * (0.5 * np.sum(drive.strain * strains) - np.vdot(drive.pattern, q) - drive.closing)
+            if self.bends is not None and drive.curvature is not None:
+                found[k] += self.bends.mutual(signal * drive.curvature, q, self.bends.rest + self._curvature(t))
+        return found
+
     def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
         return None if self.bends is None else self.bends.bands(self._curvature(t), q, c, d, g)
 

@@ -71,11 +71,11 @@ class Held(Load):
 
     Attributes
     ----------
-    axles : the driven angles. where : (rows, discs), their index in q.
+    axles : the driven angles. where : (rows, discs), their index in q. other : the other load.
     """
 
     def __init__(self, axles: tuple[Axle, ...], other: Load) -> None:
-        self.axles, self._other = axles, other
+        self.axles, self.other = axles, other
         self.where = np.array([axle.row for axle in axles]), np.array([axle.disc for axle in axles])
         self.damping, self.stiffness = other.damping.copy(), other.stiffness
         self.damping[self.where] += HELD
@@ -90,7 +90,7 @@ class Held(Load):
         return np.array([change(axle.rate, t, duration) for axle in self.axles])
 
     def applied(self, t: float, q: Float, v: Float) -> Float:
-        return self._other.force(t, q, v)
+        return self.other.force(t, q, v)
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         found = np.array(self.applied(t, q, v), dtype=float)
@@ -98,26 +98,26 @@ class Held(Load):
         return found
 
     def potential(self, t: float, q: Float) -> float:
-        return self._other.potential(t, q)
+        return self.other.potential(t, q)
 
     def driven(self, t: float, q: Float) -> float:
-        return self._other.driven(t, q)
+        return self.other.driven(t, q)
 
     def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
-        return self._other.bands(t, q, c, d, g)
+        return self.other.bands(t, q, c, d, g)
 
     def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
         """Without that of the motors, see `discs.integrators.base.Work.react`."""
-        return self._other.power(t, q, v)
+        return self.other.power(t, q, v)
 
     @cached_property
     def parameters(self) -> Parameters:
-        other = self._other.parameters
+        other = self.other.parameters
         return None if other is None else with_arrays(other, axles=np.array([(axle.row, axle.disc) for axle in self.axles]))
 
     @property
     def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]
-        return *self._other.signals, *((axle.rate, "Motor") for axle in self.axles)
+        return *self.other.signals, *((axle.rate, "Motor") for axle in self.axles)
 
     def timed(self, times: Float, h: float) -> Parameters:
         return tabled(self, times, h)

@@ -48,12 +48,13 @@ class Total(Load):
         return found
 
     @cached_property
-    def _linear(self) -> Linear:
+    def linear(self) -> Linear:
+        """The linear one, zero if there is none."""
         return next((load for load in self.loads if isinstance(load, Linear)), Linear(np.zeros_like(self.damping)))
 
     @cached_property
     def parameters(self) -> Parameters:
-        linear, own = self._linear.parameters, [load for load in self.loads if isinstance(load, OwnLoad)]
+        linear, own = self.linear.parameters, [load for load in self.loads if isinstance(load, OwnLoad)]
         functions = [load.functions for load in own]
         if linear is None or None in functions or any(not isinstance(load, Linear | OwnLoad) for load in self.loads):
             return None
@@ -63,7 +64,7 @@ class Total(Load):
 
     @property
     def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]
-        return self._linear.signals
+        return self.linear.signals
 
     def timed(self, times: Float, h: float) -> Parameters:
         return tabled(self, times, h)

@@ -28,8 +28,8 @@ from discs.chains import stencils
 from discs.chains.chain import Chain
 from discs.chains.slaved import SlavedSystem
 from discs.problem import Problem
+from discs.running.failure import SimulationError
 from discs.running.frames import frame_times
-from discs.running.time_loop import SimulationError
 from discs.solution import Solution
 
 

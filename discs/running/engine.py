@@ -8,10 +8,12 @@ from discs.problem import Problem
 ENGINES = ("compiled", "plain")
 
 
-def plain_because(problem: Problem, integrator: Integrator, engine: str) -> str:
+def plain_because(problem: Problem, integrator: Integrator, engine: str, want: tuple[str, ...]) -> str:
     """Why a run takes the plain engine, for `stats`; empty if it is compiled. ValueError for an unknown engine."""
     if checks.choice("engine", engine, ENGINES) == "plain":
         return "it was asked for"
+    if "work_by_load" in want and not problem.conserves:
+        return "the work of each load is booked by the plain engine only"
     if not integrator.compiles:
         return f"{integrator.name!r} has no compiled form"
     if problem.system.parameters is not None:

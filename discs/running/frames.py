@@ -12,7 +12,7 @@ from discs.integrators.base import Frame
 from discs.loads.motor import Held
 from discs.running.time_loop import March
 
-WANTS = ("velocity", "slope", "contact_force")
+WANTS = ("velocity", "slope", "contact_force", "work_by_load")
 ROUNDING = 1e-12  # relative to the duration: a time beyond the end by less counts as the end
 
 

@@ -8,7 +8,9 @@ import numpy as np
 from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory, Tally
 from discs.loads.motor import Held
+from discs.loads.shares import Shares
 from discs.problem import Problem
+from discs.running.failure import SimulationError
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, converging
@@ -22,23 +24,6 @@ CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown b
 TABLED = 20_000  # steps of one compiled call whose loads have tables of their signals
 
 
-class SimulationError(RuntimeError):
-    """A run that failed.
-
-    Attributes
-    ----------
-    step, time, disc : where it failed.
-    slope : |r'| of a disc that lost its heading, one step before; NaN for other causes.
-    """
-
-    def __init__(self, message: str, step: int, time: float, disc: int, slope: float = np.nan) -> None:
-        super().__init__(f"{message} (step {step}, time {time:g}, disc {disc})")
-        self.message, self.step, self.time, self.disc, self.slope = message, step, time, disc, slope
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.message, self.step, self.time, self.disc, self.slope)
-
-
 class March:
     """The state of a run, advanced step by step.
 
@@ -48,6 +33,7 @@ class March:
     compiled : use the compiled form of the chain.
     quiet : print no notice that kernels are being compiled.
     watch : the estimate of the error of the steps; None for none.
+    by_load : book what loads do one by one, too; for the plain form.
 
     Attributes
     ----------
@@ -58,11 +44,21 @@ class March:
     """
 
     def __init__(
-        self, problem: Problem, integrator: Integrator, h: float, compiled: bool, quiet: bool, watch: Watch | None = None
+        self,
+        problem: Problem,
+        integrator: Integrator,
+        h: float,
+        compiled: bool,
+        quiet: bool,
+        watch: Watch | None = None,
+        by_load: bool = False,
     ) -> None:
         self.problem, self.integrator, self.h, self.watch = problem, integrator, h, watch
         self.stuck: list[tuple[Memory, float, int]] = []
         self.system, self.work, self.step = problem.system, Work(), 0
+        if by_load:
+            shares = Shares(problem.bound, self.system.load)
+            self.work = Work(spent=shares.nothing, shares=shares)
         self.parameters = self.system.parameters if compiled else None
         fixed: Any = None if integrator.adaptive else integrator
         self.twin: FixedStep | None = fixed if self.parameters is not None else None  # steps compiled
@@ -102,14 +98,14 @@ class March:
 
     def keep(self) -> dict[str, Any]:
         """All that a restart needs, as arrays and numbers by name."""
-        work = {f"work.{name}": value for name, value in vars(self.work).items()}
+        work = {f"work.{name}": value for name, value in vars(self.work).items() if name != "shares"}
         seen = {f"watch.{name}": getattr(self.watch, name) for name in WATCHED} if self.watch else {}
         return {"step": self.step} | work | seen | {f"memory.{k}": v for k, v in self.integrator.keep(self.memory).items()}
 
     def recall(self, kept: dict[str, Any]) -> None:
         """Restore what `keep` returned for the same run."""
         self.step = int(kept["step"])
-        for name in vars(self.work):
+        for name in vars(self.work).keys() - {"shares"}:
             value = kept[f"work.{name}"]
             setattr(self.work, name, value if value.ndim else int(value))
         if self.watch:
@@ -213,9 +209,13 @@ class March:
         if (load := system.load) is not None:
             energy += load.potential(t, q)
             if not load.conservative:
-                work, dissipated = self.work.spent[::2] + self.work.spent[1::2] + frame.spent
-                work += load.driven(t, q) - load.driven(0.0, self.problem.start().hi)
+                spent, start = self.work.spent[::2] + self.work.spent[1::2] + frame.spent, self.problem.start().hi
+                work, dissipated = spent if (shares := self.work.shares) is None else spent[:, 0]
+                work += load.driven(t, q) - load.driven(0.0, start)
                 found["balance"] = np.array([work, dissipated])
+                if shares is not None:
+                    spent[0, 1:] += shares.driven(t, q) - shares.driven(0.0, start)
+                    found["balance_by_load"] = spent[:, 1:]
             if isinstance(load, Held):
                 f = load.applied(t, q, frame.rate)
                 shape = system.shape(frame.hi, frame.lo)

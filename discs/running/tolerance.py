@@ -37,9 +37,9 @@ from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find, from_s
 from discs.problem import Problem
 from discs.running import estimates
 from discs.running.estimates import LEAST_ORDER
+from discs.running.failure import SimulationError
 from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
-from discs.running.time_loop import SimulationError
 from discs.solution import Solution
 
 USUAL = 1e-3  # the default tolerance
