@@ -4,6 +4,7 @@ Admissible variations are (e psi, psi, chi) with e = R J d_1(phi). Loads add the
 length, for every psi and chi,
 
     torque tau             tau psi, about="turn": tau chi       force F              F . e psi
+    Potential V(r)         -grad V . e psi                      Custom (f, g, h)     f . e psi + g psi + h chi
     slope                  rho g . e psi                        spring               -kappa (r - r_a) . e psi
     rolling resistance     -c omega psi                         turning resistance   -c phi. chi
     torsional viscosity    -eta omega' psi'                     bending viscosity    -eta phi.' chi'
@@ -43,7 +44,7 @@ from continuum.rod import Scene
 from continuum.timing import Timing
 from discs import checks
 from discs.arrays import Float
-from discs.loads import Damping, Motor, Rest, signals
+from discs.loads import Custom, Damping, Motor, Potential, Rest, signals
 from discs.loads.binding import ROW
 
 INSIDE = 1e-12  # of the length: patterns are read this far from edges, on the side of the element
@@ -55,11 +56,13 @@ class SteeredTerms(Terms):
 
     damping : (4, S), rolling and turning resistance times the weights, and viscosities of torsion and bending.
     strain : (4, S), constant rest strains: stretch, shear, twist, curvature; those of drives alike.
+    own : densities that are functions of the motion.
     """
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.damping, self.strain = np.zeros((4, self.s.size)), np.zeros((4, self.s.size))
+        self.own: list[Custom | Potential] = []
 
     def row(self, load: Any) -> int:
         return ROW[checks.choice(f"about of {type(load).__name__}", load.about, ROW)]
@@ -93,6 +96,11 @@ def _(load: Rest, to: SteeredTerms) -> None:
 
 
 @put.register
+def _(load: Custom | Potential, to: SteeredTerms) -> None:
+    to.own.append(load)
+
+
+@put.register
 def _(load: Motor, to: SteeredTerms) -> None:
     to.axles.append(Axle(to.row(load), load.at, load.signal))
 
@@ -106,6 +114,7 @@ class ElementLoads:
     viscosity : (2, P, p + 1), of torsion and bending. rest : (4, P, p + 1), constant rest strains. offset : energy.
     drives : (L, 4, n), and strains (L, 4, P, p + 1), which signals multiply.
     motors : the motors. driven : (motors,) each, their rows in (omega, phi.) and their nodes.
+    own : loads that are functions of the motion, at the nodes.
     """
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
@@ -144,6 +153,7 @@ class ElementLoads:
         self._signals = [(drive.signal, drive.name) for drive in drives] + [(axle.rate, "Motor") for axle in terms.axles]
         ends = [int(grid.index.flat[np.argmin(np.abs(grid.places - axle.at))]) for axle in terms.axles]
         self.driven = np.array([axle.row - ROLL for axle in terms.axles], dtype=int), np.array(ends, dtype=int)
+        self.own = [load.over(grid.weights, 4) for load in terms.own]
         self.timing = Timing(scene)
         initial = [scene.fields(np.array([axle.at]))["omega" if axle.row == ROLL else "phi_rate"][0] for axle in terms.axles]
         self.motors = Motors(
@@ -151,8 +161,8 @@ class ElementLoads:
         )
 
     def values(self, t: float) -> Float:
-        """The signals of the drives and the rates of the motors, (L + motors,)."""
-        return np.array([signals.values(signal, np.array([t]), name)[0] for signal, name in self._signals])
+        """The signals of the drives, the rates of the motors, and the time, (L + motors + 1,)."""
+        return np.array([*(signals.values(signal, np.array([t]), name)[0] for signal, name in self._signals), t])
 
     @cached_property
     def _actuated(self) -> bool:
@@ -169,24 +179,28 @@ class ElementLoads:
         """The unknowns (6, n) with the rates of motors."""
         if self.motors.axles:
             q = q.copy()
-            q[4 + self.driven[0], self.driven[1]] = values[len(self.drives) :]
+            q[4 + self.driven[0], self.driven[1]] = values[len(self.drives) : -1]
         return q
 
-    def force(self, values: Float, q: Float) -> Float:
-        """The forces on unknowns (6, n), (4, n): all but those of rest strains and viscosities."""
+    def force(self, values: Float, q: Float, e: Float) -> Float:
+        """The forces on unknowns (6, n), (4, n): all but those of rest strains and viscosities. e : (2, n), contact directions."""
         found: Float = self.push + np.tensordot(values[: len(self.drives)], self.drives, 1)
         found[:2] -= self.stiffness * q[:2]
         found[2:] -= self.drag * q[4:]
+        for load in self.own:
+            found += load.force(float(values[-1]), q[:4], np.concatenate([e * q[4], q[4:]]))
         return found
 
-    def power(self, values: Float, v: Float, stiffness: Float, bent: Float) -> Float:
+    def power(self, values: Float, q: Float, v: Float, stiffness: Float, bent: Float) -> Float:
         """The rates of work and dissipation, (2,), without those of motors.
 
-        v : (4, n), rates of x, y, theta, phi. stiffness : (2, P, p + 1), of torsion and bending. bent : the same, omega', phi.'.
+        q, v : (4, n), x, y, theta, phi and their rates. stiffness : (2, P, p + 1), of torsion and bending. bent : the same, omega',
+        phi.'.
         """
         work = float(np.vdot(np.tensordot(values[: len(self.drives)], self.drives, 1), v))
         if self._actuated:
             work += float(np.vdot(self._grid.w, (stiffness * (self.at_rest(values) - self.rest)[2:] * bent).sum(axis=0)))
+        work += sum(load.power(float(values[-1]), q, v)[0] for load in self.own)
         lost = float((self.drag * v[2:] ** 2).sum()) + float(np.vdot(self._grid.w, (self.viscosity * bent**2).sum(axis=0)))
         return np.array([work, lost])
 
@@ -201,7 +215,8 @@ class ElementLoads:
 
     def energy(self, q: Float) -> float:
         """The energy of loads that is no elastic energy, of unknowns (6, n)."""
-        return self.offset + float(0.5 * self.stiffness @ (q[:2] ** 2).sum(axis=0) - np.vdot(self.push[:2], q[:2]))
+        own = sum(load.potential(0.0, q[:4]) for load in self.own)
+        return self.offset + own + float(0.5 * self.stiffness @ (q[:2] ** 2).sum(axis=0) - np.vdot(self.push[:2], q[:2]))
 
 
 def breaks(scene: Scene) -> list[float]:

@@ -150,9 +150,9 @@ class Elements:
         local = -(w * flux / self.grid.half) @ self.grid.d.T
         local[3] += w * (u[0] * n2 - u[1] * n1)
         force = self.grid.sum(local)
-        if loads is not None:
-            force += loads.force(values, q)
         e = self._at_nodes.radius * np.stack([-np.sin(q[3]), np.cos(q[3])])
+        if loads is not None:
+            force += loads.force(values, q, e)
         return np.stack([e[0] * force[0] + e[1] * force[1] + force[2], force[3]]), e, bent
 
     def rate(self, t: float, flat: Float) -> Float:
@@ -169,12 +169,12 @@ class Elements:
         if loads is None:
             return out.ravel()
         out[4:][loads.driven] = 0.0  # `held` sets these rates
-        power = loads.power(values, out[:4], self.stiffness[2:], bent)
+        power = loads.power(values, q[:4], out[:4], self.stiffness[2:], bent)
         power[0] -= torque[loads.driven] @ q[4:][loads.driven]
         return np.concatenate([out.ravel(), power])
 
     def _balance(self, times: Float, q: Float, values: Float, spent: Float) -> tuple[Float, Float | None]:
-        """Work and dissipation (F, 2), and torques of motors (F, motors), of a motion (F, 6, n) with signals (F, L + motors).
+        """Work and dissipation (F, 2), and torques of motors (F, motors), of a motion (F, 6, n) with signals (F, L + motors + 1).
 
         spent : (F, 2), the integrals of what `rate` returns for the first two.
         """

@@ -10,10 +10,10 @@ from continuum.pieces import Cut, Sampled, split
 from continuum.rod import Scene
 from discs import checks
 from discs.arrays import Float
-from discs.loads import OnRod
+from discs.loads import Custom, OnRod
 from discs.loads.binding import sampled
 
-NOT_PATTERNS = ("signal", "rate", "V", "gradient", "force", "power")  # functions of other variables than s
+NOT_PATTERNS = ("signal", "rate", "V", "gradient", "force", "power", "per_length")  # functions of other variables than s
 
 
 def read(name: str, pattern: Any, s: Float, least: float | None = None) -> Float:
@@ -52,6 +52,15 @@ def cut_patterns(scene: Scene) -> Cut | None:
         p = int(np.argmax(cut.lost))
         data.refuse(int(cut.worst[p]), f"is not finite and piecewise smooth at s = {cut.edges[p]:g}", "take one that is")
     return cut
+
+
+def check_densities(loads: tuple[OnRod, ...]) -> None:
+    """ValueError for a force of a user's own that is not per length."""
+    if any(isinstance(load, Custom) and not load.per_length for load in loads):
+        raise ValueError(
+            "Custom: its force acts on each disc, whatever its share of the length, and has no limit of many discs; give one per "
+            "length, as Custom(force, per_length=True), or take discs: simulate(lump(scene, n))"
+        )
 
 
 def point_loads(scene: Scene) -> list[float]:

@@ -168,7 +168,7 @@ def _(load: Motor, to: Terms) -> None:
     if to.scene.closed or load.at not in (0, to.scene.rod.length):
         raise ValueError(
             f"Motor: at s = {load.at:g} it makes a corner inside the rod, which the functions of the spectral method do not have; "
-            "drive an end, or take a SteeredRod, or discs: simulate(lump(scene, n))"
+            "drive an end, or take a SteeredRod, or discs: simulate(lump(scene, n)), or method='richardson'"
         )
     to.axles.append(Axle(to.row(load), load.at, load.signal))
 

@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from continuum.bounds import FIELDS, bounds, missed, over
 from continuum.initial import resolve
+from continuum.load_places import check_densities
 from continuum.mesh import semidiscretise, unseen, viscous
 from continuum.refinement import solve_elements
 from continuum.rod import Scene
@@ -63,8 +64,8 @@ def solve(
     fall below 1e-4 of its largest value).
 
     Loads of a scene with slaved headings: "spectral" takes those of `continuum.load_terms` (see `continuum.weak`), "richardson" all
-    that discs take, "leapfrog" those with a potential. Those of a `SteeredRod`: `continuum.element_loads`. Steps do not jump over
-    signals (`continuum.timing`).
+    that discs take, `Potential` and `Custom` among them, "leapfrog" those with a potential. Those of a `SteeredRod`:
+    `continuum.element_loads`. A `Custom` must be per length. Steps do not jump over signals (`continuum.timing`).
 
     Parameters
     ----------
@@ -103,6 +104,7 @@ def solve(
         fitting = ("spectral", *fitting)
     method = fitting[0] if method is None else checks.choice("method", method, fitting)
     names = check_want(want, method, scene)
+    check_densities(scene.loads)
     energy = resolve(scene).energy
     if method == "leapfrog":
         problem = semidiscretise(scene, 32 if n is None else n, ends="paper")

@@ -7,6 +7,7 @@ import numpy as np
 from continuum.load_places import point_loads
 from continuum.rod import Scene
 from discs.arrays import Float
+from discs.loads import Custom, Potential
 from discs.running.frames import wanted
 
 ARRAYS = {
@@ -34,6 +35,12 @@ def check_want(want: Iterable[str], method: str, scene: Scene) -> tuple[str, ...
                 "(own headings), or for the force on discs simulate(lump(scene, n), want=...)"
             )
     if "contact_force" in names:
+        own = [type(load).__name__ for load in scene.loads if isinstance(load, Custom | Potential)]
+        if own:
+            raise ValueError(
+                f"want: contact_force of a field with {own[0]} is not known; leave it out, or take that of discs: "
+                "simulate(lump(scene, n), want=...)"
+            )
         inside = [at for at in point_loads(scene) if scene.closed or 0 < at < scene.rod.length]
         if inside:
             raise ValueError(

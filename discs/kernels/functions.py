@@ -33,11 +33,12 @@ class Functions(NamedTuple):
 
 
 @lru_cache(KEPT)
-def of_force(force: Any, power: Any) -> tuple[Any, Any]:
+def of_force(force: Any, power: Any, per_length: bool) -> tuple[Any, Any]:
     """Force and power of a `Custom`, whose functions take (t, q, v); None for the power of all that the force does."""
-    if power is not None:
-        return numba.njit(lambda w, t, q, v: force(t, q, v)), numba.njit(lambda w, t, q, v: power(t, q, v))
-    return numba.njit(lambda w, t, q, v: force(t, q, v)), numba.njit(lambda w, t, q, v: np.sum(force(t, q, v) * v))
+    push = numba.njit((lambda w, t, q, v: w * force(t, q, v)) if per_length else (lambda w, t, q, v: force(t, q, v)))
+    if power is None:
+        return push, numba.njit(lambda w, t, q, v: np.sum(push(w, t, q, v) * v))
+    return push, numba.njit((lambda w, t, q, v: np.sum(w * power(t, q, v))) if per_length else (lambda w, t, q, v: power(t, q, v)))
 
 
 @lru_cache(KEPT)

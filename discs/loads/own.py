@@ -32,14 +32,18 @@ class Potential(OnRod):
     V: Callable[[Float, Float], Float]
     gradient: Callable[[Float, Float], tuple[Float, Float]]
 
-    def on(self, chain: Discs) -> Load:
+    def on(self, chain: Discs) -> "OwnLoad":
+        return self.over(chain.w, len(spread(chain, {})))
+
+    def over(self, w: Float, rows: int) -> "OwnLoad":
+        """The load at places with the shares w (n,) of the length, for coordinates (rows, n)."""
         for name in ("V", "gradient"):
             if not callable(given := getattr(self, name)):
                 raise ValueError(f"{name} of Potential must be a function of x and y; got {checks.shown(given)}")
-        return _Field(self, chain)
+        return _Field(self, w, rows)
 
 
-def for_kernels(make: str, *functions: Any) -> tuple[Any, Any] | None:
+def for_kernels(make: str, functions: tuple[Any, ...], *options: Any) -> tuple[Any, Any] | None:
     """Force and power by the function of this name in `discs.kernels.functions`; None unless numba compiles all functions."""
     given = [function for function in functions if function is not None]
     if "numba" not in sys.modules:
@@ -51,7 +55,7 @@ def for_kernels(make: str, *functions: Any) -> tuple[Any, Any] | None:
         return None
     from discs.kernels import functions as kernels
 
-    pair: tuple[Any, Any] = getattr(kernels, make)(*functions)
+    pair: tuple[Any, Any] = getattr(kernels, make)(*functions, *options)
     try:
         kernels.addresses((pair,))
     except NumbaError:
@@ -62,9 +66,9 @@ def for_kernels(make: str, *functions: Any) -> tuple[Any, Any] | None:
 class OwnLoad(Load):
     """A load of functions. w : (n,), shares of the discs."""
 
-    def __init__(self, of: Any, chain: Discs) -> None:
-        self._of, self.w = of, chain.w
-        self.damping = self.stiffness = spread(chain, {})
+    def __init__(self, of: Any, w: Float, rows: int) -> None:
+        self._of, self.w = of, w
+        self.damping = self.stiffness = np.zeros((rows, w.size))
 
     @property
     @abstractmethod
@@ -77,7 +81,7 @@ class _Field(OwnLoad):
 
     @property
     def functions(self) -> tuple[Any, Any] | None:
-        return for_kernels("of_gradient", self._of.gradient)
+        return for_kernels("of_gradient", (self._of.gradient,))
 
     def potential(self, t: float, q: Float) -> float:
         values = checks.called("V of Potential", self._of.V, q[0], q[1], where=f" at t = {t:g}")
@@ -107,26 +111,33 @@ class Custom(OnRod):
     Parameters
     ----------
     force : function of t, q and v, positions and velocities (rows, n) with rows x, y, theta (and phi), that returns the generalised
-        forces (rows, n) on the discs; not per length.
+        forces (rows, n) on the discs, or per length.
     power : function of the same that returns the rate of its work; None for the sum of force times v.
+    per_length : whether the force is per length, as fields need it: a disc with the share w of the length then takes w times it.
+        The power is per length too, (n,).
 
     If numba compiles both, a run is compiled, by kernels that are the same for all functions and cached on disc; the functions are
     compiled once in each process. A force that raises, or is not finite, stops the run.
     """
 
     force: Callable[[float, Float, Float], Float]
-    power: Callable[[float, Float, Float], float] | None = None
+    power: Callable[[float, Float, Float], Any] | None = None
+    per_length: bool = False
 
-    def on(self, chain: Discs) -> Load:
+    def on(self, chain: Discs) -> "OwnLoad":
+        return self.over(chain.w, len(spread(chain, {})))
+
+    def over(self, w: Float, rows: int) -> "OwnLoad":
+        """As for `Potential`."""
         if not callable(self.force) or not (self.power is None or callable(self.power)):
             raise ValueError(f"force and power of Custom must be functions of t, q and v; got {checks.shown(self)}")
-        return _Own(self, chain)
+        return _Own(self, w, rows)
 
 
 class _Own(OwnLoad):
     @property
     def functions(self) -> tuple[Any, Any] | None:
-        return for_kernels("of_force", self._of.force, self._of.power)
+        return for_kernels("of_force", (self._of.force, self._of.power), bool(self._of.per_length))
 
     def force(self, t: float, q: Float, v: Float) -> Float:
         given = checks.called("force of Custom", self._of.force, t, q, v, where=f" at t = {t:g}")
@@ -134,10 +145,12 @@ class _Own(OwnLoad):
         if found.shape != q.shape or not np.isfinite(found).all():
             got = f"shape {found.shape}" if found.shape != q.shape else "values that are not finite"
             raise ValueError(f"Custom: the force must be finite numbers of shape {q.shape}; got {got} at t = {t:g}")
-        return found
+        return self.w * found if self._of.per_length else found
 
     def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
         if self._of.power is None:
             return super().power(t, q, v)
         power = checks.called("power of Custom", self._of.power, t, q, v, where=f" at t = {t:g}")
+        if self._of.per_length:
+            power = self.w @ checks.field(f"power of Custom at t = {t:g}", power, self.w.size)
         return checks.number(f"power of Custom at t = {t:g}", power), 0.0

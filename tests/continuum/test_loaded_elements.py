@@ -178,7 +178,7 @@ def test_mounted_axles_are_at_rest():
 @pytest.mark.parametrize(
     ("loads", "message"),
     [
-        ((Custom(lambda t, q, v: q),), r"Custom: a field has no form of it; simulate\(lump\(scene, n\)\) takes it on discs"),
+        ((Custom(lambda t, q, v: q),), r"Custom: its force acts on each disc.*; give one per length, as .*per_length=True"),
         ((Motor(0.5, at=0.0),), r"Motor: its rate at t = 0 must be the initial omega at s = 0, 0; got 0\.5"),
         ((Motor(0.0, at=0.0), Motor(0.0, at=0.0)), r"Motor: s = 0 has two motors about the same axis"),
         ((Motor(signals.pulse(0.5, 0.1), at=0.0),), r"Motor: its rate jumps at t = 0\.5, which takes an infinite torque"),

@@ -37,11 +37,15 @@ from tests.continuum.test_loaded_fields import straight
         ((Torque(lambda s: np.where(s > 1, np.nan, s)),), r"pattern of Torque 0 must be finite; got nan at s = 1\.0"),
         (
             (Motor(0.0, at=1.0),),
-            r"Motor: at s = 1 it makes a corner inside the rod.*; drive an end, or take a SteeredRod, or discs",
+            r"Motor: at s = 1 it makes a corner inside the rod.*; drive an end, or take a SteeredRod, or discs.*'richardson'",
         ),
         ((Motor(0.3, at=0.0),), r"Motor: its rate at t = 0 must be the initial omega at s = 0, 0; got 0\.3"),
         ((Motor(signals.pulse(0.5, 0.1), at=3.0),), r"Motor: its rate jumps at t = 0\.5"),
-        ((Custom(lambda t, q, v: q),), r"Custom: the spectral solver has no form of it; take method='richardson'"),
+        ((Custom(lambda t, q, v: q),), r"Custom: its force acts on each disc.*; give one per length, as .*per_length=True"),
+        (
+            (Custom(lambda t, q, v: q, per_length=True),),
+            r"Custom: the spectral solver has no form of it; take method='richardson'",
+        ),
         ((Potential(lambda x, y: x, lambda x, y: (1, 0)),), r"Potential: the spectral solver has no form of it"),
     ],
 )

@@ -27,7 +27,7 @@ def wind(t, q, v):
 @numba.njit
 def power(t, q, v):
     """Not that of the wind: it is told from the default."""
-    return 0.5 * np.sum(wind(t, q, v) * v)
+    return 0.5 * np.sum(wind(t, q, v) * v, axis=0)
 
 
 @numba.njit
@@ -77,7 +77,7 @@ def test_compiled_code_calls_functions_by_their_address():
 
     rng, problem = np.random.default_rng(1), uneven(6, KINDS[0])
     q, v = rng.standard_normal((3, 6)), rng.standard_normal((3, 6))
-    for loads in ((HILLS, GUST), (Custom(wind, power),)):
+    for loads in ((HILLS, GUST), (Custom(wind, power, per_length=True),)):
         load = replace(problem, loads=loads).system.load
         force, work = of(load.parameters, 0.7, q, v)
         np.testing.assert_allclose(force, load.force(0.7, q, v), rtol=1e-13)
