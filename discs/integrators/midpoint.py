@@ -146,13 +146,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
             change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
             sweep += 1
         do.spend(chain, now, time + 0.5 * tau, tau, move, move, 2 / tau)
-        if do.driven(chain.load):
-            gained = work.rhs
-            do.mean_pullback(chain, work, now, time + 0.5 * tau, move, work.c, p, gained)
-            for row in range(p.shape[0]):
-                for i in range(p.shape[1]):
-                    gained[row, i] = 2 * (p[row, i] - now.pi[row, i]) + tau * gained[row, i]
-            do.react(chain.load, gained, p)
+        do.book_motors(chain, work, now, time + 0.5 * tau, tau, p, move)
         time += tau
         solves += sweep
         unconverged = max(unconverged, stuck(method, sweep))

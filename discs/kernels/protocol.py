@@ -47,8 +47,8 @@ def pullback(chain, work, state, t, move, c, p, g):
 
 
 @stub
-def mean_pullback(chain, work, state, t, move, c, p, g):
-    """g as by `pullback`, with the mean of grad V over a step of which `move` is the half."""
+def book_motors(chain, work, state, t, h, p, move):
+    """Book the work of motors in a midpoint step from `state`, with the middle t, after its last sweep."""
 
 
 @stub

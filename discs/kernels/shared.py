@@ -209,6 +209,20 @@ def _forces(chain, work, state, t, moves, c, p, g):
         do.hold(chain.load, t[i], c[i], p[i], -1.0, g[i])
 
 
+@fill(do.book_motors, object)
+def _book_motors(chain, work, state, t, h, p, move):
+    pass
+
+
+@part
+def torques(load, start, h, p, g):
+    """Book the work of the motors of a midpoint step from the momenta `start` to 2 p - `start`, for g = C^T (mean grad V - f)."""
+    for row in range(p.shape[0]):
+        for i in range(p.shape[1]):
+            g[row, i] = 2 * (p[row, i] - start[row, i]) + h * g[row, i]
+    do.react(load, g, p)
+
+
 # Loads without motors, and without more than diagonals and what is beside them
 
 

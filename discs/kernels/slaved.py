@@ -15,7 +15,7 @@ from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.limits import LOST_HEADING
 from discs.kernels.load import UNLOADED
-from discs.kernels.shared import forward, renew
+from discs.kernels.shared import forward, renew, torques
 from discs.kernels.slaved_matrix import GHOST, PLAIN, RING, Matrix, factor, solve
 
 
@@ -163,9 +163,11 @@ def _pullback(chain, work, state, t, move, c, p, g):
     pulled(chain, work, work.links, state, t, move, c, p, g)
 
 
-@fill(do.mean_pullback, Slaved)
-def _mean_pullback(chain, work, state, t, move, c, p, g):
-    pulled(chain, work, work.base, state, t, move, c, p, g)
+@fill(do.book_motors, Slaved)
+def _book_motors(chain, work, state, t, h, p, move):
+    if do.driven(chain.load):
+        pulled(chain, work, work.base, state, t, move, work.c, p, work.rhs)
+        torques(chain.load, state.pi, h, p, work.rhs)
 
 
 @fill(do.sweep, Slaved)

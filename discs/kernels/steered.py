@@ -14,7 +14,7 @@ from discs.chains.elements import SLOPES, VALUES
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.load import UNLOADED
-from discs.kernels.shared import forward, renew
+from discs.kernels.shared import forward, renew, torques
 from discs.kernels.steered_elements import to_points
 from discs.kernels.steered_links import pull, pulled, secant, spread, strains, turn
 from discs.kernels.steered_matrix import Matrix, assemble, factor, solve
@@ -175,11 +175,13 @@ def _pullback(chain, work, state, t, move, c, p, g):
     do.push(chain.load, state, t, move, c, p, -1.0, g)
 
 
-@fill(do.mean_pullback, Steered)
-def _mean_pullback(chain, work, state, t, move, c, p, g):
-    pull(chain, work, move, True)
-    pulled(work, c, g)
-    do.push(chain.load, state, t, move, c, p, -1.0, g)
+@fill(do.book_motors, Steered)
+def _book_motors(chain, work, state, t, h, p, move):
+    if do.driven(chain.load):
+        pull(chain, work, move, True)
+        pulled(work, work.c, work.rhs)
+        do.push(chain.load, state, t, move, work.c, p, -1.0, work.rhs)
+        torques(chain.load, state.pi, h, p, work.rhs)
 
 
 @fill(do.sweep, Steered)
