@@ -4,8 +4,9 @@ from compare.hardcases.table import Stability, stability
 from compare.lump import lump
 from compare.main_job import overview
 from compare.precision import work_precision
-from compare.results import Study, WorkPrecision
+from compare.results import Study
 from compare.study import convergence
 from compare.sweeps import sweep
+from compare.work_precision import WorkPrecision
 
 __all__ = ["Stability", "Study", "WorkPrecision", "convergence", "lump", "overview", "stability", "sweep", "work_precision"]

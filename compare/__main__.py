@@ -12,10 +12,10 @@ from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
 from compare.random_runs import gathered as runs_of
 from compare.random_runs import trust_runs
-from compare.results import WorkPrecision
 from compare.sweeps import read
 from compare.trust import gathered, trust
 from compare.trust_table import Trust
+from compare.work_precision import WorkPrecision
 from continuum import untwisting_rod
 from continuum.files import read_scene
 from discs import command_line

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from compare.results import Growth, Slips, Study, WorkPrecision, compared
+from compare.results import Growth, Slips, Study, compared
+from compare.work_precision import WorkPrecision
 from continuum import Scene
 from discs import Solution
 from discs.arrays import Float

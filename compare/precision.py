@@ -17,7 +17,7 @@ from compare.entrants import ours, peers
 from compare.lump import lump
 from compare.peers.peer import Cutoff, Peer
 from compare.reference import distance, reference
-from compare.results import Row, WorkPrecision
+from compare.work_precision import Row, WorkPrecision
 from continuum import Scene, steered_rod, untwisting_rod
 from discs import Problem, SimulationError, checks
 from discs.arrays import Float

@@ -24,13 +24,13 @@ import numpy as np
 from continuum import Scene
 from continuum.load_places import point_loads
 from continuum.solver import spline
-from continuum.wants import smooth_tests
+from continuum.wants import INSIDE, smooth_tests
 from discs import Solution, checks
 from discs.arrays import Float
 from discs.chains import stencils
 from discs.chains.chain import Chain
 from discs.loads import Rest
-from discs.mechanics.ground import end_forces, inner
+from discs.mechanics.ground import end_forces, inner, inner_places
 
 PAIRS = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y")}
 WANTS = (*PAIRS, "energy_density", "contact_force")
@@ -79,10 +79,11 @@ class Limit:
             self._values[name] = values
             if name in PAIRS:
                 floors[name] = max(estimate[array] for array in arrays)
-        if "energy_density" in want:
-            floors["energy inside"] = estimate["energy_density"] / _size(self._values["energy_density"])
+        away = slice(None) if scene.closed else inner_places(field.s, scene.rod.length)
+        for name, error in (("energy_density", "energy inside"), ("contact_force", "force inside")):
+            if name in want:
+                floors[error] = estimate[name if scene.closed else INSIDE[name]] / _size(self._values[name][:, away])
         if "contact_force" in want:
-            floors["force inside"] = np.nan  # the field's estimate is that near its ends
             for name, array in (("force weak", "contact_moments"), ("end force", "end_force"), ("end couple", "end_couple")):
                 if (found := getattr(field, array)) is not None and not (name == "end couple" and scene.steered):
                     self._values[name] = found[-1]

@@ -1,7 +1,6 @@
 """What comparisons return: tables, as text and CSV. Their pictures stand above this module, and are imported when wanted."""
 
 import csv
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,7 +13,7 @@ from discs.arrays import Float, Int
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ERRORS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+LIMITED = 3.0  # errors over the field's below which they are no longer those of the discs
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +30,7 @@ class Study:
         quantities, see `compare.quantities`.
     floor : estimated error of the field itself, the largest over positions and angles.
     dt : time step of the chains.
-    names : wanted quantities. floors : estimated errors of the field for them; NaN where it has none.
+    names : wanted quantities. floors : estimated errors of the field for them.
     """
 
     scene: Scene
@@ -94,20 +93,30 @@ class Study:
         return format_table(self.wants_rows())
 
     def wants_rows(self) -> list[tuple[str, ...]]:
-        """Its heading, and a row for each quantity: errors, last order ± spread, estimated error of the field."""
+        """Its heading, and a row for each quantity: errors, order ± spread, estimated error of the field.
+
+        The order is the last one between errors of at least three times the field's. "2.05 to 257": later ones are not shown.
+        """
         start = len(compared(self.scene))
-        last = self.order[-1] if len(self.n) > 1 else np.full(len(self.fields), np.nan)
-        orders = [
-            f"{o:.2f} ± {d:.2f}".removesuffix(" ± nan") if np.isfinite(o) else "-"
-            for o, d in zip(last, self.order_spread, strict=True)
-        ]
+        head = (self.ends, *(f"N = {n}" for n in self.n), "order", "field's error")
+        found = zip(self.names, self.error.T[start:], self.order.T[start:], self.floors, strict=True)
         return [
-            (self.ends, *(f"N = {n}" for n in self.n), "order", "field's error"),
+            head,
             *(
-                (name, *(f"{e:.2e}" for e in errors), order, f"{floor:.0e}".replace("nan", "-"))
-                for name, errors, order, floor in zip(self.names, self.error.T[start:], orders[start:], self.floors, strict=True)
+                (name, *(f"{e:.2e}" for e in errors), self._told(errors, orders, floor), f"{floor:.0e}")
+                for name, errors, orders, floor in found
             ),
         ]
+
+    def _told(self, errors: Float, orders: Float, floor: float) -> str:
+        """The last order that is one of the discs, with its spread, and up to which N if the field's own error hides later ones."""
+        above = np.flatnonzero(errors >= LIMITED * floor)
+        last = int(above[-1]) if above.size else 0
+        if last == 0 or not np.isfinite(orders[last - 1]):
+            return "-"
+        before = np.abs(orders[max(0, last - 3) : last] - orders[last - 1])
+        spread = f" ± {before.max():.2f}" if last > 1 else ""
+        return f"{orders[last - 1]:.2f}{spread}" + (f" to {self.n[last]}" if last + 1 < len(self.n) else "")
 
     def plot(self, path: str | Path | None = None, *others: "Study", ax: "Axes | None" = None) -> "Axes":
         """Error against n, with `others` in the same axes; saved if a path is given."""
@@ -173,123 +182,6 @@ def format_table(rows: list[tuple[str, ...]]) -> str:
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
-
-
-class Row(NamedTuple):
-    """One method with one setting on one problem.
-
-    error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
-    seconds : processor time, median of the rounds, or mean of a long run's two times. steps, gradients, solves : counts, None if a
-    peer has none. remark : why there is no result, or what is wrong with it.
-    """
-
-    problem: str
-    n: int
-    method: str
-    ours: bool
-    setting: float = np.nan
-    error: float = np.nan
-    seconds: float = np.nan
-    steps: int | None = None
-    gradients: int | None = None
-    solves: int | None = None
-    remark: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class WorkPrecision:
-    """Speed against error.
-
-    Attributes
-    ----------
-    rows : one for each method, setting and problem, failures included.
-    references : (problem, n) -> estimated error of the reference.
-    differences : method -> how its problem differs from that of the others.
-    """
-
-    rows: list[Row]
-    references: dict[tuple[str, int], float]
-    differences: dict[str, str]
-
-    @property
-    def problems(self) -> list[tuple[str, int]]:
-        """The problems, by name and number of discs."""
-        return list(dict.fromkeys((row.problem, row.n) for row in self.rows))
-
-    def curve(self, problem: str, n: int, method: str) -> tuple[Float, Float]:
-        """Errors and seconds of a method, from loose to tight, without runs that are slower and less accurate than another one."""
-        found = [(r.error, r.seconds) for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method) and r.error < 1]
-        best = [(e, s) for e, s in found if not any(f <= e and t <= s and (f, t) != (e, s) for f, t in found)]
-        errors, seconds = np.array(sorted(best, reverse=True)).reshape(-1, 2).T
-        return errors, seconds
-
-    def time_at(self, error: float, problem: str, n: int, ours: bool) -> tuple[float, str]:
-        """The least time in which any method reaches an error (log-log interpolation between its runs), and its name;
-        infinite if none reaches it."""
-        best = np.inf, ""
-        for method in dict.fromkeys(r.method for r in self.rows if r.ours == ours):
-            errors, seconds = self.curve(problem, n, method)
-            if errors.size and errors[-1] <= error:
-                at = float(np.exp(np.interp(-np.log(error), -np.log(errors), np.log(seconds))))
-                best = min(best, (at, method))
-        return best
-
-    def speedups(self, errors: Iterable[float] = ERRORS) -> str:
-        """Ratio of times, fastest peer over ours, at equal error, as a table."""
-        lines = ["| problem | N | error | ours | | fastest peer | | times |", "| --- " * 8 + "|"]
-        for problem, n in self.problems:
-            for error in errors:
-                (ours, mine), (peers, other) = self.time_at(error, problem, n, True), self.time_at(error, problem, n, False)
-                if not np.isfinite(ours):
-                    continue
-                ratio = f"{peers / ours:.0f}" if np.isfinite(peers) else "no peer"
-                there = f"{1e3 * peers:.3g} ms" if np.isfinite(peers) else "–"
-                lines.append(
-                    f"| {problem} | {n} | {error:.0e} | {mine} | {1e3 * ours:.3g} ms | {other or '–'} | {there} | {ratio} |"
-                )
-        return "\n".join(lines)
-
-    def table(self) -> str:
-        """All runs, as a table."""
-        lines = ["| problem | N | method | setting | error | ms | steps | gradients | solves | remark |", "| --- " * 10 + "|"]
-        for r in self.rows:
-            counts = " | ".join("–" if c is None else str(c) for c in (r.steps, r.gradients, r.solves))
-            error = f"{r.error:.1e}" if np.isfinite(r.error) else "–"
-            lines.append(
-                f"| {r.problem} | {r.n} | {r.method} | {r.setting:.3g} | {error} | {1e3 * r.seconds:.3g} | {counts} | {r.remark} |"
-            )
-        return "\n".join(lines)
-
-    def report(self) -> str:
-        """Speedups, what differs, and all runs, in Markdown."""
-        floor = max(self.references.values(), default=0.0)
-        return "\n\n".join(
-            [
-                "# Speed against error",
-                f"Ours against the fastest peer at equal error. Reference: gauss8 with short steps, off by at most {floor:.1e}.",
-                self.speedups(),
-                *(f"* {name}: {how}." for name, how in self.differences.items()),
-                "All runs; errors relative to the largest value of each of x, y, θ (φ); times are processor time, medians, "
-                "of long runs means of two.",
-                self.table(),
-            ]
-        )
-
-    def save(self, path: str | Path) -> None:
-        """All runs, as CSV."""
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(Row._fields)
-            writer.writerows(self.rows)
-
-    def plot(self, path: str | Path | None = None) -> "Sequence[Axes]":
-        """Error against time, a panel for each problem; saved if a path is given."""
-        from compare import figures
-
-        axes = figures.precision(self)
-        if path is not None:
-            figures.save(axes[0], path)
-        return axes
 
 
 class Growth(NamedTuple):

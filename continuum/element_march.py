@@ -1,6 +1,7 @@
 """Motions of elements in time, by SciPy's methods with control of the error of steps."""
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -39,23 +40,35 @@ def march(
             )
         return rate(t, y)
 
-    options: dict[str, Any] = {"method": "DOP853"} if pattern is None else {"method": "Radau", "jac_sparsity": pattern}
-    found = [start[None]] * int(np.count_nonzero(times <= 0))
+    options: dict[str, Any] = {"rtol": 1e-12, "atol": tol}
+    method = scipy.integrate.DOP853 if pattern is None else partial(scipy.integrate.Radau, jac_sparsity=pattern)
+    found = [start] * int(np.count_nonzero(times <= 0))
     for a, b in pairwise(edges):
         low, high = (a + INSIDE * end, b - INSIDE * end) if edges.size > 2 else (a, b)
-        asked = times[(times > a) & (times <= b)]
+
+        def inside(t: float, y: Float, low: float = low, high: float = high) -> Float:
+            return counted(min(max(t, low), high), y)
+
         with np.errstate(over="ignore", invalid="ignore"):  # Radau's differences by unknowns that act on nothing
-            part = scipy.integrate.solve_ivp(
-                lambda t, y, low=low, high=high: counted(min(max(t, low), high), y),
-                (a, b),
-                start,
-                t_eval=np.append(asked[asked < b], b),
-                rtol=1e-12,
-                atol=tol,
-                **options,
-            )
-        if not part.success:
-            raise ValueError(f"the field could not be integrated: {part.message}; ask for a larger tol or a shorter duration")
-        found.append(part.y.T[: asked.size])
-        start = part.y[:, -1]
-    return np.concatenate(found)
+            solver = method(inside, a, start, b, **options)
+            while solver.status == "running":
+                t, y = solver.t, solver.y
+                step(solver)
+                for asked in times[(times > t) & (times <= solver.t)]:
+                    if asked == solver.t:
+                        found.append(solver.y)
+                    elif pattern is not None:
+                        found.append(solver.dense_output()(asked))
+                    else:  # a shorter step: inside steps near the limit of stability the polynomial of order 7 is far less accurate
+                        short = method(inside, t, y, asked, first_step=asked - t, **options)
+                        while short.status == "running":
+                            step(short)
+                        found.append(short.y)
+        start = solver.y
+    return np.array(found)
+
+
+def step(solver: Any) -> None:
+    message = solver.step()
+    if solver.status == "failed":
+        raise ValueError(f"the field could not be integrated: {message}; ask for a larger tol or a shorter duration")

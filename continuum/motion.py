@@ -13,6 +13,7 @@ from continuum.initial import resolve
 from continuum.pieces import POINTS
 from continuum.rod import Scene
 from continuum.stepping import Steps
+from continuum.wants import with_inside
 from discs.arrays import Float
 from discs.skew import Phase
 
@@ -98,7 +99,7 @@ class Runner:
         ends = np.cumsum([len(z.pi) for z in states])[:-1]
         known = [None] * len(states) if watch is None else [watch.at(*group) for group in zip(states, integrals, strict=True)]
         parts = [ground.at(*group) for group in zip(np.split(self.times, ends), states, known, strict=True)]
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return with_inside({name: np.concatenate([part[name] for part in parts]) for name in parts[0]}, self.s, rod.closed)
 
 
 def distances(a: dict[str, Float], b: dict[str, Float]) -> dict[str, float]:

@@ -13,6 +13,7 @@ from continuum.element_ground import ElementGround
 from continuum.elements import UNKNOWNS, Course, Elements
 from continuum.initial import resolve
 from continuum.rod import Scene
+from continuum.wants import INSIDE, with_inside
 from discs import Solution
 from discs.arrays import Float
 
@@ -42,7 +43,8 @@ class Found(NamedTuple):
         if want:
             ground = ElementGround(self.elements, s, want)
             frames = [ground.at(float(t), q) for t, q in zip(times, self.course.q, strict=True)]
-            found |= {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+            stacked = {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+            found |= with_inside(stacked, s, self.elements.scene.closed)
         return found
 
 
@@ -114,7 +116,7 @@ def solve_elements(scene: Scene, bound: Mapping[str, float], times: Float, progr
         reaction=runs[0].course.reaction,
         stats={"method": "elements", "order": DEGREE, "elements": found.grid.count, "nodes": found.n},
         error_estimate=error,
-        **values,  # type: ignore[arg-type]  # none of them is one of the above
+        **{name: value for name, value in values.items() if name not in INSIDE.values()},  # type: ignore[arg-type]
     )
 
 

@@ -17,7 +17,7 @@ from continuum.refinement import solve_elements
 from continuum.rod import Scene
 from continuum.spectral import solve_spectral
 from continuum.timing import Timing
-from continuum.wants import arrays, check_want
+from continuum.wants import arrays, check_want, estimated
 from discs import Midpoint, Problem, Solution, Suzuki4, checks, simulate, suggest_dt
 from discs.arrays import Float, Spline
 from discs.running.frames import frame_times
@@ -84,10 +84,11 @@ def solve(
     Returns
     -------
     Solution on the nodes `s`. `error_estimate` has the errors of x, y, theta, omega, for a `SteeredRod` of phi and phi_rate, of the
-    arrays of wanted quantities (the largest over nodes, frames and components), and of the energy: its largest distance over all
-    frames from the energy of the initial fields, by quadrature (with loads, that of energy - work + dissipated). The steps of the
-    spectral field conserve the energy to rounding (and to the tolerance of sweeps). At frames within steps it is the energy of the
-    interpolated fields, and has their error.
+    arrays of wanted quantities (the largest over nodes, frames and components; "contact_force_inside", "energy_density_inside": an
+    eighth of the length or more from free ends), and of the energy: its largest distance over all frames from the energy of the
+    initial fields, by quadrature (with loads, that of energy - work + dissipated). The steps of the spectral field conserve the
+    energy to rounding (and to the tolerance of sweeps). At frames within steps it is the energy of the interpolated fields, and has
+    their error.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def solve(
         return replace(run, stats=run.stats | {"scene": scene.description()})
     if n is not None or dt is not None:
         raise ValueError(f"n and dt belong to method='leapfrog'; {method!r} chooses both from tol")
-    bound = bounds(tol, scene.steered, arrays(names, scene.closed))
+    bound = bounds(tol, scene.steered, estimated(names, scene.closed))
     times = frame_times(frames, scene.duration)
     solver = {"elements": solve_elements, "spectral": solve_spectral, "richardson": _richardson}[method]
     found = solver(scene, bound, times, progress, names)

@@ -8,6 +8,7 @@ from continuum.load_places import point_loads
 from continuum.rod import Scene
 from discs.arrays import Float
 from discs.loads import Custom, Potential
+from discs.mechanics.ground import inner_places
 from discs.running.frames import wanted
 
 ARRAYS = {
@@ -17,6 +18,7 @@ ARRAYS = {
     "energy_density": ("energy_density",),
     "energy_flux": ("energy_flux",),
 }
+INSIDE = {name: f"{name}_inside" for name in ("contact_force", "energy_density")}  # their errors away from free ends
 OFFERS = {
     "spectral": tuple(ARRAYS),
     "elements": tuple(ARRAYS),
@@ -51,9 +53,24 @@ def check_want(want: Iterable[str], method: str, scene: Scene) -> tuple[str, ...
     return names
 
 
+def with_inside(fields: dict[str, Float], s: Float, closed: bool) -> dict[str, Float]:
+    """Fields by name and, with free ends, the parts that `INSIDE` names, an eighth of the length or more from the ends.
+
+    s : (S,), the places, the first and the last at the ends.
+    """
+    away = inner_places(s, s[-1])
+    return fields if closed else fields | {INSIDE[name]: fields[name][..., away] for name in INSIDE if name in fields}
+
+
 def arrays(want: tuple[str, ...], closed: bool) -> tuple[str, ...]:
     """The arrays of wanted quantities; a closed rod has no end forces."""
     return tuple(name for key in ARRAYS if key in want for name in ARRAYS[key] if not (closed and name.startswith("end_")))
+
+
+def estimated(want: tuple[str, ...], closed: bool) -> tuple[str, ...]:
+    """The names of estimated errors of wanted quantities: their arrays, and what `INSIDE` names."""
+    names = arrays(want, closed)
+    return (*names, *(INSIDE[name] for name in INSIDE if name in names and not closed))
 
 
 def smooth_tests(s: Float, length: float, closed: bool) -> Float:

@@ -11,7 +11,11 @@ FILES = [path for package in BELOW for path in sorted((ROOT / package).rglob("*.
 MODULES = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in FILES}
 
 # A result plots, views and saves itself: that needs modules above it, imported when a method is called.
-FACADES = {"discs.solution": ("discs.pictures", "discs.files"), "compare.results": ("compare.figures",)}
+FACADES = {
+    "discs.solution": ("discs.pictures", "discs.files"),
+    "compare.results": ("compare.figures",),
+    "compare.work_precision": ("compare.figures",),
+}
 
 # A link law takes a chain, which finds the law by its name: only the type is imported.
 FACADES |= {f"discs.chains.links.{law}": ("discs.chains.chain",) for law in ("law", "linear", "true")}

@@ -133,7 +133,12 @@ def inner(run: Solution) -> NDArray[np.bool_]:
         raise ValueError("a run of discs is needed; got a field, whose contact_force is the force per length inside it")
     if chain.ends == "ring":
         return np.ones(chain.n, dtype=bool)
-    away: NDArray[np.bool_] = np.minimum(chain.s, chain.length - chain.s) > (SHARE - 1e-9) * chain.length
+    return inner_places(chain.s, chain.length)
+
+
+def inner_places(s: Float, length: float) -> NDArray[np.bool_]:
+    """Which places s (n,) are away from the ends 0 and length by an eighth of the length or more."""
+    away: NDArray[np.bool_] = np.minimum(s, length - s) > (SHARE - 1e-9) * length
     return away
 
 

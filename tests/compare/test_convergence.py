@@ -43,6 +43,17 @@ def test_spread_of_orders_is_the_largest_change_of_the_last_one():
     assert np.isnan(replace(study, n=study.n[:2], k=k[:2], error=error[:2]).order_spread).all()
 
 
+def test_orders_that_are_those_of_the_field_are_not_shown():
+    """Errors 4^-j + floor: at 129 discs the floor is a third of the error and more."""
+    k, floor = 0.5 ** np.arange(4.0), 0.011
+    error = np.tile((0.25 ** np.arange(4.0) + floor)[:, None], 4)
+    study = Study(untwisting_rod(), "consistent", 2 ** np.arange(4, 8) + 1, k, error, 0.0, 0.1, ("velocity",), (floor,))
+    assert study.wants_rows()[1][-2:] == ("1.83 ± 0.13 to 65", "1e-02")
+    assert replace(study, floors=(1e-4,)).wants_rows()[1][-2] == "1.46 ± 0.49"
+    assert replace(study, floors=(1.0,)).wants_rows()[1][-2] == "-"
+    assert replace(study, n=study.n[:2], k=k[:2], error=error[:2]).wants_rows()[1][-2] == "1.95"
+
+
 def test_plain_springs_tend_to_order_one(paper_field):
     study = convergence(untwisting_rod(), (65, 129, 257, 513), "springs", field=paper_field, progress=False)
     assert (study.order <= 1.0).all(), study.table()

@@ -12,7 +12,7 @@ from compare.entrants import ours, peers
 from compare.peers import reduced
 from compare.peers.peer import Cutoff, Outcome, Peer
 from compare.reference import distance, reference
-from compare.results import Row, WorkPrecision
+from compare.work_precision import Row, WorkPrecision
 from continuum import untwisting_rod
 from discs import Problem
 from discs.kernels import driver
