@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.chains.chain import SteeredChain
-from discs.chains.elements import SLOPES, VALUES
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.load import UNLOADED
 from discs.kernels.shared import forward, renew, torques
-from discs.kernels.steered_elements import to_points
+from discs.kernels.steered_joints import JOINTS, Matrix, sizes, to_points
 from discs.kernels.steered_links import pull, pulled, secant, spread, strains, turn
-from discs.kernels.steered_matrix import Matrix, assemble, factor, solve
+from discs.kernels.steered_matrix import assemble, factor, solve
 
 
 class Steered(NamedTuple):
@@ -25,7 +24,7 @@ class Steered(NamedTuple):
     momentum.
 
     stiffness : (4, n + 1), k times the stiffness of stretch, shear, torsion and bending. shift : (4,), advance along a ring.
-    slopes, values : (2, 3), those of `discs.chains.elements`, for degree 2.
+    joints : links or elements, `discs.kernels.steered_joints`.
     """
 
     weights: NDArray
@@ -35,9 +34,7 @@ class Steered(NamedTuple):
     shift: NDArray
     k: float
     ring: bool
-    degree: int
-    slopes: NDArray
-    values: NDArray
+    joints: Any
     load: Any
 
 
@@ -56,7 +53,7 @@ def parameters(
     padded[:, 1 : 1 + stiffness.shape[1]] = stiffness
     padded[:, 0] = padded[:, -1]
     paces = np.stack([given.radius / roots[0], 1 / roots[0], 1 / roots[1]])
-    return Steered(weights, paces, padded, scale, shift, given.k, ring, given.degree, SLOPES, VALUES, load)
+    return Steered(weights, paces, padded, scale, shift, given.k, ring, JOINTS[given.degree], load)
 
 
 class Workspace(NamedTuple):
@@ -64,7 +61,7 @@ class Workspace(NamedTuple):
 
     Of the base position: base (4, n + 1), differences of neighbours; angles (4, n + 1), cosine and sine of headings and of the mean
     headings of links; strain (4, n + 1). Of a moved position or a step, see `discs.chains.steered`: links, along, tension
-    (4, n + 1), across (2, n + 1), couple (n + 1,). joined (3, 6), see `discs.kernels.steered_elements`.
+    (4, n + 1), across (2, n + 1), couple (n + 1,). joined (3, 6), see `discs.kernels.steered_joints`.
     """
 
     base: NDArray
@@ -88,8 +85,8 @@ def _workspace(chain):
     n = chain.weights.shape[1]
     base, angles, strain = np.zeros((4, n + 1)), np.zeros((4, n + 1)), np.zeros((4, n + 1))
     links, turned, along, tension = np.zeros((4, n + 1)), np.zeros((2, n + 1)), np.zeros((2, n + 1)), np.zeros((4, n + 1))
-    far = n // 2 if chain.degree == 2 else 0
-    matrix = Matrix(np.empty((3, n)), np.empty((4, n)), np.empty((4, far)), np.empty((2, 2, n)), np.empty(11))
+    m = do.factors(chain, 1.0, 1)  # not `pick`: parts count no references
+    matrix = Matrix(m.d[0], m.o[0], m.ends[0], m.far[0], m.right[0], m.columns[0], m.edge[0])
     across, couple = np.zeros((2, n + 1)), np.zeros(n + 1)
     c, step, rhs = np.empty((4, n)), np.empty((4, n)), np.empty((2, n))
     return Workspace(base, angles, strain, links, turned, along, tension, across, couple, c, step, rhs, matrix, np.empty((3, 6)))
@@ -98,14 +95,15 @@ def _workspace(chain):
 @fill(do.factors, Steered, _nrt=True)
 def _factors(chain, g, count):
     n, kind = chain.weights.shape[1], np.array([g]).dtype
-    far = n // 2 if chain.degree == 2 else 0
-    d, o, beyond = np.empty((count, 3, n), kind), np.empty((count, 4, n), kind), np.empty((count, 4, far), kind)
-    return Matrix(d, o, beyond, np.empty((count, 2, 2, n), kind), np.empty((count, 11), kind))
+    ends, elements = sizes(chain.joints, n)
+    d, o = np.empty((count, 3, n), kind), np.empty((count, 4, n), kind)
+    near, far, right = np.empty((count, 3, ends), kind), np.empty((count, 4, elements), kind), np.empty((count, 2, ends), kind)
+    return Matrix(d, o, near, far, right, np.empty((count, 2, 2, n), kind), np.empty((count, 11), kind))
 
 
 @fill(do.pick, Steered)
 def _pick(chain, m, j):
-    return Matrix(m.d[j], m.o[j], m.far[j], m.columns[j], m.edge[j])
+    return Matrix(m.d[j], m.o[j], m.ends[j], m.far[j], m.right[j], m.columns[j], m.edge[j])
 
 
 @fill(do.settle, Steered)
@@ -131,8 +129,7 @@ def _settle(chain, work, hi, lo):
     if chain.ring:
         middle[n] = 0.5 * (phi[0] + chain.shift[3] + phi[n - 1])
         middle[0] = middle[n]
-    if chain.degree == 2:
-        to_points(chain, work.base, middle, 1, n + 1)
+    to_points(chain.joints, work.base, middle, 1, n + 1)
     for j in range(n + 1):
         mid_cos[j], mid_sin[j] = turn(middle[j])
     strains(chain, work.base, mid_cos, mid_sin, work.strain)

@@ -7,7 +7,7 @@ the change: two pairs for each disc and sweep.
 import math
 
 from discs.kernels.compiled import part
-from discs.kernels.steered_elements import to_links, to_points
+from discs.kernels.steered_joints import close, to_links, to_points
 
 TILE = 128
 
@@ -77,8 +77,7 @@ def spread(chain, work, y, a, b):
             for row in range(4):
                 work.links[row, j] = y[row, 0] - y[row, n - 1]
             work.couple[j] = 0.5 * (y[3, 0] + y[3, n - 1])
-    if chain.degree == 2:
-        to_points(chain, work.links, work.couple, a, b)
+    to_points(chain.joints, work.links, work.couple, a, b)
 
 
 @part
@@ -157,17 +156,13 @@ def tensions(work, stiffness, a, b, k):
 def pull(chain, work, y, full):
     """Geometry and tensions after a step or a move y, TILE links at a time, so that intermediate results stay in the cache."""
     links = work.couple.size
-    for a in range(chain.degree - 1, links, TILE):  # tiles of whole elements
+    for a in range(chain.joints.first, links, TILE):
         b = min(a + TILE, links)
         spread(chain, work, y, a, b)
         secant(work, a, b, chain.k, full)
         tensions(work, chain.stiffness, a, b, chain.k)
-        if chain.degree == 2:
-            to_links(chain, work.tension, work.couple, a, b)
-    if chain.degree == 2:  # link 0 is the last one, on a ring and, without stiffness, at free ends
-        work.couple[0] = work.couple[links - 1]
-        for row in range(4):
-            work.tension[row, 0] = work.tension[row, links - 1]
+        to_links(chain.joints, work.tension, work.couple, a, b)
+    close(chain.joints, work.tension, work.couple)
 
 
 @part

@@ -1,35 +1,20 @@
 """The linear system of a step of discs with own headings: its entries, factors and solution; on a ring with a border."""
 
-from typing import NamedTuple
-
-from numpy.typing import NDArray
-
 from discs.kernels import blocks
-from discs.kernels import steered_elements as elements
+from discs.kernels import steered_joints as joints
 from discs.kernels.banded import reciprocal
-from discs.kernels.compiled import part
-
-
-class Matrix(NamedTuple):
-    """A factored matrix: `blocks`, and on a ring the columns of the last disc, which border the others.
-
-    far : (4, elements), blocks of the first and last discs of elements (`steered_elements`); none for links.
-    columns : (2, 2, n), solutions for the border. edge : (11,), two blocks of the border and the inverse of its Schur complement.
-    """
-
-    d: NDArray
-    o: NDArray
-    far: NDArray
-    columns: NDArray
-    edge: NDArray
+from discs.kernels.compiled import fill, part
+from discs.kernels.steered_joints import Links
 
 
 @part
 def assemble(chain, work, c, one, g, m):
     """Entries of `one` I + g C^T B^T (stiffness) B C for the mean geometry in `work`."""
-    if chain.degree == 2:
-        elements.assemble_elements(chain, work, c, one, g, m)
-        return
+    joints.entries(chain.joints, chain, work, c, one, g, m)
+
+
+@fill(joints.entries, Links)
+def _entries(joints, chain, work, c, one, g, m):
     n, d, o = c.shape[1], m.d, m.o
     per = 1 / chain.k
     cx, cy, ct, cp = c[0], c[1], c[2], c[3]
@@ -129,20 +114,8 @@ def solve_border(d, o, columns, e, b):
 
 
 @part
-def coupled(chain, m):
-    """The diagonal of the discs that are not condensed, and the blocks that couple them."""
-    o = m.far[:, ::1] if chain.degree == 2 else m.o[:, ::1]
-    return m.d[:, :: chain.degree], o
-
-
-@part
 def factor(chain, m):
-    if chain.degree == 1 and not chain.ring:
-        blocks.factor(m.d, m.o)
-        return
-    if chain.degree == 2:
-        elements.condense(m)
-    d, o = coupled(chain, m)
+    d, o = joints.condense(chain.joints, m)
     if chain.ring:
         border(d, o, m.columns, m.edge)
     else:
@@ -151,15 +124,9 @@ def factor(chain, m):
 
 @part
 def solve(chain, m, b):
-    if chain.degree == 1 and not chain.ring:
-        blocks.substitute(m.d, m.o, b)
-        return
-    if chain.degree == 2:
-        elements.reduce(m, b)
-    d, o = coupled(chain, m)
+    d, o, right = joints.reduce(chain.joints, m, b)
     if chain.ring:
-        solve_border(d, o, m.columns, m.edge, b[:, :: chain.degree])
+        solve_border(d, o, m.columns, m.edge, right)
     else:
-        blocks.substitute(d, o, b[:, ::2])
-    if chain.degree == 2:
-        elements.expand(m, b)
+        blocks.substitute(d, o, right)
+    joints.expand(chain.joints, m, b)
