@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators import METHODS, Integrator, find, from_settings
-from discs.integrators.base import Cut
+from discs.integrators import METHODS, Integrator, OneStep, find, from_settings
+from discs.integrators.work import Cut
 from discs.problem import Problem
+from discs.running.album import Album
 from discs.running.engine import plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.recording import Recording, Rows, kept_settings
@@ -238,8 +239,14 @@ def _run(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown or NO_BAR, record:
         if record.complete:
             return record.solution({})
-        march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want)
+        album: Album | None = None
+        if not because and checkpoint is None and not want and system.load is None and isinstance(integrator, OneStep):
+            album = Album(system, times, h)
+        march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want, album)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
+        if album is not None:
+            _fill(album, march, shown, record)
+            record.rows, first = album.rows, times.size
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)
             while march.step < before:
@@ -262,6 +269,18 @@ def _run(
         if watch is not None:
             told["step_error"] = _uncut(partial(march.step_error, rest), record, times.size, march)
         return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started}, march)
+
+
+def _fill(album: Album, march: March, shown: "Progress | None", record: Rows) -> None:
+    """Take all steps of a run, and all its frames on the way."""
+    frames, steps = album.steps.size, int(album.steps[-1])
+    while album.done < frames:
+        march.on(steps)
+        if shown is not None:
+            shown.update(march.step)
+        if album.done < frames and album.steps[album.done] == march.step:  # left by compiled steps: it may fail
+            frame = partial(observed, march, float(album.rests[album.done]), (), False)
+            album.write(_uncut(frame, record, album.done, march))
 
 
 def _uncut(call: Callable[[], Result], record: Rows, f: int, march: March) -> Result:

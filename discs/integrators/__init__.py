@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from discs import checks
-from discs.integrators.base import FixedStep, Integrator, OneStep, Work
+from discs.integrators.base import FixedStep, Integrator, OneStep
 from discs.integrators.composition import KahanLi6, Suzuki4
 from discs.integrators.gauss import Gauss, Gauss4, Gauss6, Gauss8
 from discs.integrators.ivp import BDF, DOP853, LSODA, RK45, Radau
@@ -16,6 +16,7 @@ from discs.integrators.midpoint import Midpoint
 from discs.integrators.perlmutter import McLachlanPerlmutter
 from discs.integrators.radau import Radau3, Radau5
 from discs.integrators.rk4 import RK4
+from discs.integrators.work import Work
 
 
 def _methods() -> dict[str, type[Integrator]]:

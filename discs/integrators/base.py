@@ -2,119 +2,15 @@
 
 import signal
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, TypeAlias, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 
-from discs.arrays import Float, Int
+from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
-from discs.loads.shares import Shares
-from discs.skew import Load, Parameters, Phase, add
-
-
-@dataclass
-class Work:
-    """The cost of a run so far.
-
-    Attributes
-    ----------
-    gradients : evaluations of grad V.
-    solves : banded linear systems.
-    unconverged : implicit steps that reached their limit of sweeps.
-    spent : (4,), the work of loads and the energy that they dissipate, each with its lost digits. With `shares` (4, 1 + L): that
-        of all loads, and that of each.
-    shares : the loads one by one, if asked for.
-    """
-
-    gradients: int = 0
-    solves: int = 0
-    unconverged: int = 0
-    spent: Float = field(default_factory=lambda: np.zeros(4))
-    shares: Shares | None = None
-
-    def add(self, tally: "Tally") -> None:
-        """Add the cost of compiled steps."""
-        self.gradients += tally.gradients
-        self.solves += tally.solves
-        self.unconverged += tally.unconverged
-        if tally.spent is not NOTHING:
-            self.book(tally.spent[0], tally.spent[2])
-
-    def book(self, work: float | Float, dissipated: float | Float) -> None:
-        """Add the work of loads and the energy that they dissipate."""
-        total, lost = add(self.spent[::2], self.spent[1::2], np.array([work, dissipated]))
-        self.spent = np.array([total[0], lost[0], total[1], lost[1]])
-
-    def power(self, load: Load, t: float, q: Float, v: Float) -> Float:
-        """The rates of work and of dissipation, as they are booked: (2,), or (2, 1 + L)."""
-        found = np.array(load.power(t, q, v))
-        return found if self.shares is None else np.column_stack([found, self.shares.power(t, q, v)])
-
-    def spend(self, load: Load | None, t: float, weight: float, z: Phase, move: Float, v: Float) -> None:
-        """Book what a load does in a time `weight` around t, at the positions of z after a move, with velocities v (rows, n)."""
-        if load is not None and not load.conservative:
-            work, dissipated = self.power(load, t, z.hi + (z.lo + move), v)
-            self.book(weight * work, weight * dissipated)
-
-    def react(self, load: Load, gained: Float, p: Float) -> None:
-        """Book the work of motors, whose torques changed the momenta by `gained` while the mean momenta were p, both like pi."""
-        rows, discs = np.array([(axle.row, axle.disc) for axle in load.axles]).T
-        gains, means = (np.atleast_2d(of)[rows - 2, discs] for of in (gained, p))
-        if self.shares is None:
-            self.book(float(gains @ means), 0.0)
-            return
-        work = np.zeros(self.spent.shape[1])
-        work[0], work[1:][self.shares.motors] = gains @ means, gains * means
-        self.book(work, 0.0 * work)
-
-
-NOTHING = np.zeros(4)  # spent by a run without loads
-
-
-class Tally(NamedTuple):
-    """The result of compiled steps.
-
-    steps, gradients, solves, unconverged : steps taken, and their cost. lost : a disc that lost its heading, or -1.
-    passed : looks done. doubted : whether a step to be compared comes next. blown : whether the kinetic energy exceeds the bound.
-    spent : (4,), as in `Work`.
-    """
-
-    steps: int
-    gradients: int
-    solves: int
-    unconverged: int
-    lost: int
-    passed: int
-    doubted: bool
-    blown: bool
-    spent: Float = NOTHING
-
-
-Memory: TypeAlias = Any  # a NamedTuple or an object: all that a method needs between steps, of a type of its own
-Looks = tuple[int, Int, Float, Float, float]  # arguments of `discs.kernels.driver.march`
-NO_LOOKS: Looks = 0, np.empty(0, np.int64), np.empty((1, 1, 0)), np.empty((1, 2, 1)), np.inf
-
-
-class Cut(Exception):
-    """Ctrl-C interrupted a compiled call. Its steps are dropped; the memory is the one before the call."""
-
-
-class Frame(NamedTuple):
-    """Positions q = hi + lo and their rates of change, all (rows, n).
-
-    lost : a disc that lost its heading in the compiled step to the frame, or -1. If there is one, the rest is undefined.
-    seen : q, energy and largest slip, if the compiled form computed them.
-    spent : (2,), work of loads and dissipated energy since the last step; with `Work.shares` (2, 1 + L).
-    """
-
-    hi: Float
-    lo: Float
-    rate: Float
-    lost: int = -1
-    seen: tuple[Float, float, float] | None = None
-    spent: Float = NOTHING[:2]
+from discs.integrators.work import NO_LOOKS, NO_STOPS, NOTHING, Cut, Frame, Looks, Memory, Stops, Tally, Work
+from discs.skew import Parameters, Phase
 
 
 class Integrator(ABC):
@@ -243,6 +139,7 @@ class FixedStep(Integrator):
         steps: int,
         bound: float,
         looks: Looks = NO_LOOKS,
+        stops: Stops = NO_STOPS,
     ) -> tuple[Memory, Tally]:
         """The compiled twin of `steps` times `advance` from the time t; `chain` is `system.parameters`.
 
@@ -256,7 +153,7 @@ class FixedStep(Integrator):
             times = np.add.outer(starts, h * np.array([0.0, *self.parameters.nodes]))
             chain = chain._replace(load=system.load.timed(times.ravel(), abs(h)))
         state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta (n,) are (1, n) in compiled code
-        found = driver.march(self.parameters, self.twin_of(system, chain), state, t, h, steps, bound, *looks)
+        found = driver.march(self.parameters, self.twin_of(system, chain), state, t, h, steps, bound, *looks, *stops)
         tally = Tally(*found)
         if system.load is not None and not system.load.conservative:
             tally = tally._replace(spent=chain.load.spent)

@@ -9,8 +9,9 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators.base import OneStep, Work
+from discs.integrators.base import OneStep
 from discs.integrators.collocation import Collocation, Tableau
+from discs.integrators.work import Work
 from discs.skew import Load, Phase, SkewGradient, add
 
 

@@ -8,8 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from discs import checks
-from discs.integrators.base import OneStep, Work
+from discs.integrators.base import OneStep
 from discs.integrators.midpoint import Composed, Midpoint
+from discs.integrators.work import Work
 from discs.skew import Phase, SkewGradient
 
 

@@ -11,7 +11,8 @@ from discs import checks
 from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
-from discs.integrators.base import Frame, Integrator, Work
+from discs.integrators.base import Integrator
+from discs.integrators.work import Frame, Work
 from discs.kernels.shared import columns
 from discs.skew import Parameters, Phase
 

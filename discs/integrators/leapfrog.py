@@ -7,8 +7,9 @@ import numpy as np
 
 from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
-from discs.integrators.base import FixedStep, Frame, Work
+from discs.integrators.base import FixedStep
 from discs.integrators.rk4 import RK4
+from discs.integrators.work import Frame, Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import Cost, fill
 from discs.kernels.shared import add as advance

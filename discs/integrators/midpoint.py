@@ -8,7 +8,8 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators.base import OneStep, Work
+from discs.integrators.base import OneStep
+from discs.integrators.work import Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, interrupted
 from discs.kernels.shared import add as advance

@@ -7,7 +7,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from discs.arrays import Float
-from discs.integrators.base import OneStep, Work
+from discs.integrators.base import OneStep
+from discs.integrators.work import Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import Cost, fill
 from discs.kernels.shared import add as advance

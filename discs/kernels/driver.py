@@ -16,16 +16,23 @@ POLLED = 16  # steps between two polls of Ctrl-C; sweeps poll it themselves
 
 
 @kernel
-def march(method, chain, state, t, h, steps, bound, first, looks, places, defects, limit):
+def march(
+    method, chain, state, t, h, steps, bound, first, looks, places, defects, limit, since, framed, stops, rests, q, rates, told
+):
     """Take `steps` steps from a state at the time t, in place, after `first` earlier ones.
 
-    Returns (taken, gradients, solves, unconverged, lost, passed, doubted, blown). The steps end after one whose kinetic energy
-    exceeds `bound` (`blown`), and after one in which the heading of disc `lost` >= 0 vanishes: on the straight line of its motion
-    or, if the step did not converge or is explicit, along its initial velocity. The state is then undefined. It is undefined too if
-    `taken` is -1, after Ctrl-C.
+    Returns (taken, gradients, solves, unconverged, lost, passed, doubted, blown, framed). The steps end after one whose kinetic
+    energy exceeds `bound` (`blown`), and after one in which the heading of disc `lost` >= 0 vanishes: on the straight line of its
+    motion or, if the step did not converge or is explicit, along its initial velocity. The state is then undefined. It is undefined
+    too if `taken` is -1, after Ctrl-C.
 
     The steps whose numbers are in `looks` (m,) are looked at, see `discs.running.step_error`: `defects` (m, 2, rows) and `places`
     are filled in, and `passed` counts the looks. The steps end before one whose defect exceeds `limit` (`doubted`).
+
+    Frames from number `framed` on are recorded a time `rests` (F,) after `stops` (F,) steps, of which `since` were taken before, by
+    a step of their own that does not change the motion: positions in q (rows, F, n), the rates of the rows from theta on in
+    `rates` (rows - 2, F, n), energy and largest slip in `told` (2, F). The steps end before a frame whose step does not converge,
+    loses a heading or exceeds `bound`; `framed` is the number of the next frame.
     """
     before = do.enter(chain, state)
     work, room, after = do.workspace(chain), do.room(method, chain, before), do.like(before)
@@ -36,25 +43,46 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
     gradients, solves, unconverged, lost, passed, doubted, blown = 0, 0, 0, -1, 0, False, False
     due = looks[0] - first if looks.size else -1  # steps of this call
     spent, kept = chain.load.spent, np.empty(chain.load.spent.size)
+    basis, rate = np.empty((rows, n * (stops.size > 0))), np.empty((rows, n * (stops.size > 0)))
     do.settle(chain, work, before.hi, before.lo)
     do.lost(chain, work, slope)
-    for step in range(steps):
+    step = 0
+    while True:
+        framing = framed < stops.size and stops[framed] - since == step
+        if step == steps and not framing:
+            break
         if step % POLLED == 0 and interrupted():
-            return -1, gradients, solves, unconverged, -1, passed, doubted, False
+            return -1, gradients, solves, unconverged, -1, passed, doubted, False, framed
+        size = rests[framed] if framing else h
         if do.vanishing(chain) and do.jumps(method):
-            lost = ahead(chain, work, before, h, c, half, slope)
-            if lost >= 0:
-                return step + 1, gradients, solves, unconverged, lost, passed, doubted, False
-        if step >= due - 3 and step < due:
+            lost = ahead(chain, work, before, size, c, half, slope)
+            if lost >= 0 and not framing:
+                return step + 1, gradients, solves, unconverged, lost, passed, doubted, False, framed
+        if not framing and step >= due - 3 and step < due:
             place = places[passed % places.shape[0]]
             if step == due - 3:
                 place[:] = 0.0
             add_up(chain, before.hi, -1.0 if step == due - 3 else 3.0 if step == due - 2 else -3.0, place)
         for j in range(spent.size):
             kept[j] = spent[j]
-        new = do.step(method, chain, work, room, before, after, t + step * h, h)
+        moves = size != 0  # a frame may be at a step
+        new = do.step(method, chain, work, room, before, after, t + step * h, size) if moves else (0, 0, 0)
         if new[0] < 0:
-            return -1, gradients, solves, unconverged, -1, passed, doubted, False
+            return -1, gradients, solves, unconverged, -1, passed, doubted, False, framed
+        if framing:
+            shown = after if moves else before
+            lost = max(lost, do.lost(chain, work, slope))
+            unfit = moves and (lost >= 0 or new[2] > 0 or not do.kinetic(after, chain, h) <= bound)
+            if not unfit:
+                told[0, framed], told[1, framed] = frame(chain, work, shown, basis, rate, q[:, framed], rates[:, framed])
+                gradients, solves, framed = gradients + new[0], solves + new[1], framed + 1
+            for j in range(spent.size):
+                spent[j] = kept[j]
+            do.settle(chain, work, before.hi, before.lo)
+            lost = do.lost(chain, work, slope)
+            if unfit:
+                break
+            continue
         if step + 1 == due:
             place = places[passed % places.shape[0]]
             add_up(chain, after.hi, 1.0, place)
@@ -62,27 +90,27 @@ def march(method, chain, state, t, h, steps, bound, first, looks, places, defect
                 do.kick(before, after, chain, work, t + step * h, h, c, g, kicked)
                 disc_by_disc(chain, kicked, place)
             if judge(chain, before.hi, after.hi, place, defects[passed]) > limit:
-                steps, doubted = step, True
+                doubted = True
                 for j in range(spent.size):
                     spent[j] = kept[j]
                 break
             passed += 1
             due = looks[passed] - first if passed < looks.size else -1
+        step += 1
         gradients, solves, unconverged = gradients + new[0], solves + new[1], unconverged + new[2]
         if do.vanishing(chain) and new[2] > 0 and not do.jumps(method):
             do.settle(chain, work, before.hi, before.lo)
             lost = ahead(chain, work, before, h, c, half, slope)
             if lost >= 0:
-                return step + 1, gradients, solves, unconverged, lost, passed, doubted, False
+                return step, gradients, solves, unconverged, lost, passed, doubted, False, framed
             do.settle(chain, work, after.hi, after.lo)
         lost = do.lost(chain, work, slope)
         before, after = after, before
         blown = not do.kinetic(before, chain, h) <= bound
         if lost >= 0 or blown:
-            steps = step + 1
             break
     do.leave(chain, before, state)
-    return steps, gradients, solves, unconverged, lost, passed, doubted, blown
+    return step, gradients, solves, unconverged, lost, passed, doubted, blown, framed
 
 
 @part
@@ -125,6 +153,19 @@ def seen(chain, work, c, hi, lo, v, q):
         x, y = v[0, i] - c[0, i] / c[2, i] * v[2, i], v[1, i] - c[1, i] / c[2, i] * v[2, i]
         slip = max(slip, np.sqrt(x * x + y * y))
     return energy, slip
+
+
+@part
+def frame(chain, work, state, c, v, q, rates):
+    """Record a state, the base position: q (rows, n) and the `rates` of the rows from theta on; returns energy and largest slip.
+
+    c, v : workspace like positions.
+    """
+    do.rate(state, chain, work, c, 1.0, v)
+    for row in range(rates.shape[0]):
+        for i in range(rates.shape[1]):
+            rates[row, i] = v[row + 2, i]
+    return seen(chain, work, c, state.hi, state.lo, v, q)
 
 
 @kernel

@@ -8,7 +8,6 @@ eliminated first, which leaves a block tridiagonal matrix for the even discs.
 
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
 from discs.chains.elements import SLOPES, VALUES

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators.base import Frame
+from discs.integrators.work import Frame
 from discs.loads.motor import Held
 from discs.running.time_loop import March
 

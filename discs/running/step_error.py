@@ -19,7 +19,8 @@ import numpy as np
 
 from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
-from discs.integrators.base import FixedStep, Looks, Memory, Tally, Work
+from discs.integrators.base import FixedStep
+from discs.integrators.work import Looks, Memory, Tally, Work
 from discs.kernels.limits import TURNED
 from discs.running.stats import Stats
 from discs.skew import Parameters, Phase

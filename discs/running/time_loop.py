@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from discs.integrators import FixedStep, Integrator, Work
-from discs.integrators.base import NO_LOOKS, Cut, Frame, Memory, Tally
+from discs.integrators.work import NO_LOOKS, NO_STOPS, Cut, Frame, Memory, Tally
 from discs.loads.motor import Held
 from discs.loads.shares import Shares
 from discs.problem import Problem
+from discs.running.album import Album
 from discs.running.failure import SimulationError
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.stats import Stats
@@ -18,7 +19,7 @@ from discs.skew import Phase, Placed
 from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which a notice is printed; reading kernels from the cache does not count
-_PREPARED: set[tuple[type, ...]] = set()
+_PREPARED: set[tuple[object, ...]] = set()
 WATCHED = ("looks", "passed", "doubted", "defects", "places")  # attributes of a `Watch` that a restart needs
 CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown between calls, Ctrl-C is polled in every sweep
 TABLED = 20_000  # steps of one compiled call whose loads have tables of their signals
@@ -34,6 +35,7 @@ class March:
     quiet : print no notice that kernels are being compiled.
     watch : the estimate of the error of the steps; None for none.
     by_load : book what loads do one by one, too; for the plain form.
+    album : the frames that compiled steps record; None if each frame is asked for.
 
     Attributes
     ----------
@@ -52,8 +54,9 @@ class March:
         quiet: bool,
         watch: Watch | None = None,
         by_load: bool = False,
+        album: Album | None = None,
     ) -> None:
-        self.problem, self.integrator, self.h, self.watch = problem, integrator, h, watch
+        self.problem, self.integrator, self.h, self.watch, self.album = problem, integrator, h, watch, album
         self.stuck: list[tuple[Memory, float, int]] = []
         self.system, self.work, self.step = problem.system, Work(), 0
         if by_load:
@@ -80,7 +83,8 @@ class March:
     def _prepare(self, quiet: bool) -> None:
         """Compile the kernels (once per machine) or read them from disc (once per process)."""
         chain = self.parameters if self.twin is None else self.twin.twin_of(self.system, self.parameters)
-        key = (type(self.integrator), type(chain), *map(type, chain or ()))  # the types of the chain's laws and load too
+        asked = self.album is None  # for frames, by a kernel of its own
+        key = (asked, type(self.integrator), type(chain), *map(type, chain or ()))  # the types of the chain's laws and load too
         if key in _PREPARED:
             return
         from discs.kernels.compiled import compiling, uncached
@@ -93,7 +97,8 @@ class March:
         with compiling(say, NOTICE):
             if self.twin is not None:
                 self.twin.march(self.system, self.parameters, self.memory, 0.0, self.h, 0, self.bound)
-            self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
+            if asked:
+                self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
         _PREPARED.add(key)
 
     def keep(self) -> dict[str, Any]:
@@ -117,7 +122,7 @@ class March:
 
     def on(self, step: int) -> None:
         """Advance towards a step, not beyond it; not at all if Ctrl-C was pressed and its handler did not raise."""
-        before, cost, watch, looks = self.memory, vars(self.work).copy(), self.watch, NO_LOOKS
+        before, cost, watch, album, looks = self.memory, vars(self.work).copy(), self.watch, self.album, NO_LOOKS
         try:
             if self.twin is None:
                 taken = self._plain()
@@ -125,10 +130,13 @@ class March:
                 steps = min(self.chunk, step - self.step)
                 if watch is not None:
                     steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
+                stops = NO_STOPS if album is None else album.given(self.step)
                 self.memory, tally = self.twin.march(
-                    self.system, self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks
+                    self.system, self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks, stops
                 )
                 taken = self._accept(self.twin, before, tally)
+                if album is not None:
+                    album.done = tally.framed
         except Cut:  # drop this call
             self.memory = before
             vars(self.work).update(cost)

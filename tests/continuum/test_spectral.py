@@ -13,7 +13,7 @@ from continuum.galerkin import SpectralRod
 from continuum.hints import bent_hint
 from continuum.scenes import PAPER
 from discs import Gauss6, SimulationError
-from discs.integrators.base import Work
+from discs.integrators.work import Work
 
 pytestmark = pytest.mark.slow
 
