@@ -2,10 +2,9 @@
 
 import time as clock
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +17,7 @@ from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.engine import plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
+from discs.running.progress import NO_BAR, Progress
 from discs.running.recording import Recording, Rows, kept_settings
 from discs.running.stats import Stats, of_search
 from discs.running.step_error import WARNED, Watch, cure, doubts
@@ -271,7 +271,7 @@ def _run(
         return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started}, march)
 
 
-def _fill(album: Album, march: March, shown: "Progress | None", record: Rows) -> None:
+def _fill(album: Album, march: March, shown: Progress | None, record: Rows) -> None:
     """Take all steps of a run, and all its frames on the way."""
     frames, steps = album.steps.size, int(album.steps[-1])
     while album.done < frames:
@@ -290,30 +290,3 @@ def _uncut(call: Callable[[], Result], record: Rows, f: int, march: March) -> Re
             return call()
         except Cut:
             record.pause(f, march)
-
-
-class Progress:
-    """A progress bar, created after a second: creating one costs as much as a short run."""
-
-    def __init__(self, name: str, total: int) -> None:
-        self._name, self._total, self._started = name, total, clock.perf_counter()
-        self._bar: Any = None
-
-    def __enter__(self) -> "Progress":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
-
-    def update(self, step: int) -> None:
-        """Show the number of steps taken."""
-        if self._bar is not None:
-            self._bar.update(step - self._bar.n)
-        elif clock.perf_counter() - self._started > 1:
-            from tqdm import tqdm
-
-            self._bar = tqdm(total=self._total, initial=step, desc=self._name, unit="step")
-
-
-NO_BAR = nullcontext()

@@ -93,8 +93,9 @@ Memory: TypeAlias = Any  # a NamedTuple or an object: all that a method needs be
 Looks = tuple[int, Int, Float, Float, float]  # arguments of `discs.kernels.driver.march`
 NO_LOOKS: Looks = 0, np.empty(0, np.int64), np.empty((1, 1, 0)), np.empty((1, 2, 1)), np.inf
 
-Stops = tuple[int, int, Int, Float, Float, Float, Float]  # those about frames
-NO_STOPS: Stops = 0, 0, np.empty(0, np.int64), np.empty(0), np.empty((1, 0, 1)), np.empty((1, 0, 1)), np.empty((2, 0))
+Stops = tuple[int, int, int, Int, Float, Float, Float, Float]  # those about frames
+NO_FRAMES = np.empty((1, 0, 1))
+NO_STOPS: Stops = 2**62, 0, 0, np.empty(0, np.int64), np.empty(0), NO_FRAMES, NO_FRAMES, np.empty((2, 0))
 
 
 class Cut(Exception):

@@ -17,7 +17,26 @@ POLLED = 16  # steps between two polls of Ctrl-C; sweeps poll it themselves
 
 @kernel
 def march(
-    method, chain, state, t, h, steps, bound, first, looks, places, defects, limit, since, framed, stops, rests, q, rates, told
+    method,
+    chain,
+    state,
+    t,
+    h,
+    steps,
+    bound,
+    first,
+    looks,
+    places,
+    defects,
+    most,
+    many,
+    since,
+    framed,
+    stops,
+    rests,
+    q,
+    rates,
+    told,
 ):
     """Take `steps` steps from a state at the time t, in place, after `first` earlier ones.
 
@@ -27,12 +46,12 @@ def march(
     too if `taken` is -1, after Ctrl-C.
 
     The steps whose numbers are in `looks` (m,) are looked at, see `discs.running.step_error`: `defects` (m, 2, rows) and `places`
-    are filled in, and `passed` counts the looks. The steps end before one whose defect exceeds `limit` (`doubted`).
+    are filled in, and `passed` counts the looks. The steps end before one whose defect exceeds `most` (`doubted`).
 
     Frames from number `framed` on are recorded a time `rests` (F,) after `stops` (F,) steps, of which `since` were taken before, by
     a step of their own that does not change the motion: positions in q (rows, F, n), the rates of the rows from theta on in
     `rates` (rows - 2, F, n), energy and largest slip in `told` (2, F). The steps end before a frame whose step does not converge,
-    loses a heading or exceeds `bound`; `framed` is the number of the next frame.
+    loses a heading or exceeds `bound`, and after `many` steps that did not converge; `framed` is the number of the next frame.
     """
     before = do.enter(chain, state)
     work, room, after = do.workspace(chain), do.room(method, chain, before), do.like(before)
@@ -89,7 +108,7 @@ def march(
             if few:
                 do.kick(before, after, chain, work, t + step * h, h, c, g, kicked)
                 disc_by_disc(chain, kicked, place)
-            if judge(chain, before.hi, after.hi, place, defects[passed]) > limit:
+            if judge(chain, before.hi, after.hi, place, defects[passed]) > most:
                 doubted = True
                 for j in range(spent.size):
                     spent[j] = kept[j]
@@ -107,7 +126,7 @@ def march(
         lost = do.lost(chain, work, slope)
         before, after = after, before
         blown = not do.kinetic(before, chain, h) <= bound
-        if lost >= 0 or blown:
+        if lost >= 0 or blown or unconverged >= many:
             break
     do.leave(chain, before, state)
     return step, gradients, solves, unconverged, lost, passed, doubted, blown, framed

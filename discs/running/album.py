@@ -32,9 +32,12 @@ class Album:
         self.q, self.told = np.empty((rows, times.size, n)), np.empty((2, times.size))
         self.rates = np.empty((rows - 2, times.size, n))
 
-    def given(self, first: int) -> Stops:
-        """The arguments about frames for compiled steps, after `first` steps."""
-        return first, self.done, self.steps, self.rests, self.q, self.rates, self.told
+    def given(self, first: int, stuck: int) -> Stops:
+        """The arguments about frames for compiled steps, after `first` steps, of which `stuck` did not converge.
+
+        The steps end when that number has doubled, so that `March` can remember where it was.
+        """
+        return max(stuck, 1), first, self.done, self.steps, self.rests, self.q, self.rates, self.told
 
     def write(self, found: dict[str, Any]) -> None:
         """Store the next frame, if compiled steps left it."""

@@ -130,7 +130,7 @@ class March:
                 steps = min(self.chunk, step - self.step)
                 if watch is not None:
                     steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
-                stops = NO_STOPS if album is None else album.given(self.step)
+                stops = NO_STOPS if album is None else album.given(self.step, self.work.unconverged)
                 self.memory, tally = self.twin.march(
                     self.system, self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks, stops
                 )

@@ -1,0 +1,32 @@
+"""The progress bar of a run."""
+
+import time as clock
+from contextlib import nullcontext
+from typing import Any
+
+
+class Progress:
+    """A progress bar, created after a second: creating one costs as much as a short run."""
+
+    def __init__(self, name: str, total: int) -> None:
+        self._name, self._total, self._started = name, total, clock.perf_counter()
+        self._bar: Any = None
+
+    def __enter__(self) -> "Progress":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def update(self, step: int) -> None:
+        """Show the number of steps taken."""
+        if self._bar is not None:
+            self._bar.update(step - self._bar.n)
+        elif clock.perf_counter() - self._started > 1:
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=self._total, initial=step, desc=self._name, unit="step")
+
+
+NO_BAR = nullcontext()
