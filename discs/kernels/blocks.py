@@ -1,7 +1,7 @@
 r"""Symmetric block tridiagonal systems with blocks of two, eliminated from both ends at once as in `discs.kernels.banded`.
 
 Blocks D_i = [[p, q], [q, r]] on the diagonal, d (3, n), and O_i between i and i + 1, o (4, n) row by row; the last O_i is not used.
-The factors overwrite them: D_i^{-1}, and O_i^T D_i^{-1} above the middle block m = n // 2, O_{i-1} D_i^{-1} (at i - 1) below it.
+Only the first n discs are used. The factors overwrite them: D_i^{-1}, and O_i^T D_i^{-1} above the middle block m = n // 2, O_{i-1} D_i^{-1} (at i - 1) below it.
 """
 
 from discs.kernels.banded import reciprocal
@@ -9,9 +9,8 @@ from discs.kernels.compiled import part
 
 
 @part
-def factor(d, o):
+def factor(d, o, n):
     """Factors, in place."""
-    n = d.shape[1]
     m = n // 2
     p, q, r = d[0, 0], d[1, 0], d[2, 0]
     last = n - 1
@@ -47,9 +46,8 @@ def factor(d, o):
 
 
 @part
-def substitute(d, o, b):
+def substitute(d, o, b, n):
     """Solve with the factors of `factor`, b (2, n) in place."""
-    n = d.shape[1]
     m = n // 2
     last = n - 1
     x, y = b[0, 0], b[1, 0]

@@ -69,11 +69,11 @@ def couple(i, j, c, g, per, stiffness, along, across, o):
 def border(d, o, columns, edge):
     """Factor the matrix of a ring: the chain without its last disc, then the border of that disc."""
     last = d.shape[1] - 1
-    e, first, second = edge, columns[0, :, :last], columns[1, :, :last]
+    e, first, second = edge, columns[0], columns[1]
     for i in range(4):
         e[i] = o[i, last]  # last disc (rows) with disc 0
         e[4 + i] = o[i, last - 1]  # disc last - 1 (rows) with the last
-    blocks.factor(d[:, :last], o[:, :last])
+    blocks.factor(d, o, last)
     first[:], second[:] = 0, 0
     first[0, 0] += e[0]
     first[1, 0] += e[1]
@@ -83,34 +83,19 @@ def border(d, o, columns, edge):
     first[1, last - 1] += e[6]
     second[0, last - 1] += e[5]
     second[1, last - 1] += e[7]
-    blocks.substitute(d[:, :last], o[:, :last], first)
-    blocks.substitute(d[:, :last], o[:, :last], second)
-    x = d[0, last] - across_border(e, 0, first)
-    y = d[1, last] - across_border(e, 0, second)
-    z = d[2, last] - across_border(e, 1, second)
+    blocks.substitute(d, o, first, last)
+    blocks.substitute(d, o, second, last)
+    x = d[0, last] - across_border(e, 0, first, last)
+    y = d[1, last] - across_border(e, 0, second, last)
+    z = d[2, last] - across_border(e, 1, second, last)
     det = reciprocal(x * z - y * y)
     e[8], e[9], e[10] = z * det, -y * det, x * det
 
 
 @part
-def across_border(e, row, b):
-    """A row of the coupling of the last disc to the others, times b (2, n - 1)."""
-    end = b.shape[1] - 1
-    return e[2 * row] * b[0, 0] + e[2 * row + 1] * b[1, 0] + e[4 + row] * b[0, end] + e[6 + row] * b[1, end]
-
-
-@part
-def solve_border(d, o, columns, e, b):
-    """Solve with the factors of `border`, b (2, n) in place."""
-    last = b.shape[1] - 1
-    inner = b[:, :last]
-    blocks.substitute(d[:, :last], o[:, :last], inner)
-    x, y = b[0, last] - across_border(e, 0, inner), b[1, last] - across_border(e, 1, inner)
-    x, y = e[8] * x + e[9] * y, e[9] * x + e[10] * y
-    for row in range(2):
-        for i in range(last):
-            b[row, i] -= columns[0, row, i] * x + columns[1, row, i] * y
-    b[0, last], b[1, last] = x, y
+def across_border(e, row, b, n):
+    """A row of the coupling of the last disc to the n others, times b (2, n)."""
+    return e[2 * row] * b[0, 0] + e[2 * row + 1] * b[1, 0] + e[4 + row] * b[0, n - 1] + e[6 + row] * b[1, n - 1]
 
 
 @part
@@ -119,14 +104,21 @@ def factor(chain, m):
     if chain.ring:
         border(d, o, m.columns, m.edge)
     else:
-        blocks.factor(d, o)
+        blocks.factor(d, o, d.shape[1])
 
 
 @part
 def solve(chain, m, b):
     d, o, right = joints.reduce(chain.joints, m, b)
+    n = d.shape[1] - chain.ring
+    blocks.substitute(d, o, right, n)
     if chain.ring:
-        solve_border(d, o, m.columns, m.edge, right)
-    else:
-        blocks.substitute(d, o, right)
+        e, p, q = m.edge, right[0], right[1]
+        x, y = p[n] - across_border(e, 0, right, n), q[n] - across_border(e, 1, right, n)
+        x, y = e[8] * x + e[9] * y, e[9] * x + e[10] * y
+        for row in range(2):
+            first, second, to = m.columns[0, row], m.columns[1, row], right[row]
+            for i in range(n):
+                to[i] -= first[i] * x + second[i] * y
+        p[n], q[n] = x, y
     joints.expand(chain.joints, m, b)

@@ -115,8 +115,8 @@ def test_pentadiagonal_elimination(kind):
 @pytest.mark.parametrize("kind", [float, complex])
 def test_block_tridiagonal_elimination(kind):
     def solve(d, o, b):
-        blocks.factor(d, o)
-        blocks.substitute(d, o, b)
+        blocks.factor(d, o, d.shape[1])
+        blocks.substitute(d, o, b, d.shape[1])
 
     rng = np.random.default_rng(3)
 
