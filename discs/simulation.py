@@ -240,7 +240,8 @@ def _run(
         if record.complete:
             return record.solution({})
         album: Album | None = None
-        if not because and checkpoint is None and not want and system.load is None and isinstance(integrator, OneStep):
+        alone = checkpoint is None and not want and system.load is None
+        if alone and not because and isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None:
             album = Album(system, times, h)
         march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want, album)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))

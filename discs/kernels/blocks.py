@@ -1,7 +1,8 @@
 r"""Symmetric block tridiagonal systems with blocks of two, eliminated from both ends at once as in `discs.kernels.banded`.
 
 Blocks D_i = [[p, q], [q, r]] on the diagonal, d (3, n), and O_i between i and i + 1, o (4, n) row by row; the last O_i is not used.
-Only the first n discs are used. The factors overwrite them: D_i^{-1}, and O_i^T D_i^{-1} above the middle block m = n // 2, O_{i-1} D_i^{-1} (at i - 1) below it.
+The factors of the first n discs overwrite them: D_i^{-1}, and O_i^T D_i^{-1} above the middle block m = n // 2, O_{i-1} D_i^{-1}
+(at i - 1) below it.
 """
 
 from discs.kernels.banded import reciprocal

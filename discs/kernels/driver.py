@@ -7,7 +7,7 @@ the functions that steps call, in this folder.
 import numpy as np
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import interrupted, kernel, part
+from discs.kernels.compiled import fill, interrupted, kernel, part
 from discs.kernels.limits import TURNED
 from discs.kernels.shared import ahead, columns, disc_by_disc, forward
 from discs.skew import Phase
@@ -93,7 +93,7 @@ def march(
             lost = max(lost, do.lost(chain, work, slope))
             unfit = moves and (lost >= 0 or new[2] > 0 or not do.kinetic(after, chain, h) <= bound)
             if not unfit:
-                told[0, framed], told[1, framed] = frame(chain, work, shown, basis, rate, q[:, framed], rates[:, framed])
+                told[0, framed], told[1, framed] = do.frame(chain, work, shown, basis, rate, q[:, framed], rates[:, framed])
                 gradients, solves, framed = gradients + new[0], solves + new[1], framed + 1
             for j in range(spent.size):
                 spent[j] = kept[j]
@@ -174,12 +174,8 @@ def seen(chain, work, c, hi, lo, v, q):
     return energy, slip
 
 
-@part
-def frame(chain, work, state, c, v, q, rates):
-    """Record a state, the base position: q (rows, n) and the `rates` of the rows from theta on; returns energy and largest slip.
-
-    c, v : workspace like positions.
-    """
+@fill(do.frame, object)
+def _frame(chain, work, state, c, v, q, rates):
     do.rate(state, chain, work, c, 1.0, v)
     for row in range(rates.shape[0]):
         for i in range(rates.shape[1]):

@@ -160,7 +160,7 @@ def factor(order, ring, corners, m):
     if ring:
         border(d, o, m.columns, m.edge)
     else:
-        blocks.factor(d, o)
+        blocks.factor(d, o, d.shape[1])
 
 
 @part
@@ -183,7 +183,7 @@ def solve(order, ring, corners, m, b):
     if ring:
         solve_border(m.d, m.o, m.columns, m.edge, m.rest)
     else:
-        blocks.substitute(m.d, m.o, m.rest)
+        blocks.substitute(m.d, m.o, m.rest, m.d.shape[1])
     x1, x2 = load(m.rest[0], 0), load(m.rest[1], 0)
     p, q = before(x1), before(x2)
     store(b, LANES * (order.rows - 2), x1)

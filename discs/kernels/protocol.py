@@ -57,6 +57,14 @@ def gradient(chain, work, move, g):
 
 
 @stub
+def frame(chain, work, state, c, v, q, rates):
+    """Record a state, the base position: q (rows, n) and the `rates` of the rows from theta on; returns energy and largest slip.
+
+    c, v : workspace like positions.
+    """
+
+
+@stub
 def sweep(chain, work, state, t, h, p, move, first):
     """One sweep (the `first` or a later one) of a midpoint step from `state` at the time t: changes p and the half step `move`.
 

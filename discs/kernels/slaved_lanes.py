@@ -125,6 +125,11 @@ def _leave(chain, own, state):
         disc_by_disc(chain, array, to)
 
 
+@fill(do.frame, Laned)
+def _frame(chain, work, state, c, v, q, rates):
+    return 0.0, 0.0  # frames of discs in lanes are not recorded on the way: `simulate` asks for each
+
+
 @fill(do.settle, Laned)
 def _settle(chain, work, hi, lo):
     rows, first, ring = chain.order.rows, chain.order.first, chain.ends == RING

@@ -99,6 +99,21 @@ def across_border(e, row, b, n):
 
 
 @part
+def solve_border(d, o, columns, e, b):
+    """Solve with the factors of `border`, b (2, n) in place."""
+    n = d.shape[1] - 1
+    blocks.substitute(d, o, b, n)
+    p, q = b[0], b[1]
+    x, y = p[n] - across_border(e, 0, b, n), q[n] - across_border(e, 1, b, n)
+    x, y = e[8] * x + e[9] * y, e[9] * x + e[10] * y
+    for row in range(2):
+        first, second, to = columns[0, row], columns[1, row], b[row]
+        for i in range(n):
+            to[i] -= first[i] * x + second[i] * y
+    p[n], q[n] = x, y
+
+
+@part
 def factor(chain, m):
     d, o = joints.condense(chain.joints, m)
     if chain.ring:
@@ -110,15 +125,8 @@ def factor(chain, m):
 @part
 def solve(chain, m, b):
     d, o, right = joints.reduce(chain.joints, m, b)
-    n = d.shape[1] - chain.ring
-    blocks.substitute(d, o, right, n)
     if chain.ring:
-        e, p, q = m.edge, right[0], right[1]
-        x, y = p[n] - across_border(e, 0, right, n), q[n] - across_border(e, 1, right, n)
-        x, y = e[8] * x + e[9] * y, e[9] * x + e[10] * y
-        for row in range(2):
-            first, second, to = m.columns[0, row], m.columns[1, row], right[row]
-            for i in range(n):
-                to[i] -= first[i] * x + second[i] * y
-        p[n], q[n] = x, y
+        solve_border(d, o, m.columns, m.edge, right)
+    else:
+        blocks.substitute(d, o, right, d.shape[1])
     joints.expand(chain.joints, m, b)
