@@ -2,6 +2,7 @@
 
 import cProfile
 import pickle
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -40,6 +41,22 @@ def test_asking_for_frames_does_not_change_the_trajectory(name):
         np.testing.assert_array_equal(getattr(few, row)[-1], getattr(many, row)[-1])
     again = simulate(problem, name, 0.0037, frames=many.t[[5, 56]], progress=False)
     np.testing.assert_array_equal(again.theta[0], many.theta[5])
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.2])
+def test_frames_on_the_way_are_those_asked_for(dt):
+    """Compiled steps record frames as they go; with `want` each frame is asked for. With the long step some do not converge."""
+    problem = uneven(7, Model("springs", "unit"))
+    method = Midpoint(sweeps=4, tolerance=1e-11)
+    times = np.array([0.0, 0.5 * dt, 0.51 * dt, 2 * dt, 3.3 * dt])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        one, other = (simulate(problem, method, dt, times, want=want, progress=False) for want in ((), "velocity"))
+    assert (one.stats["unconverged"] > 0) == (dt > 0.1)
+    for name in ("steps", "gradients", "unconverged", "step_error"):
+        assert one.stats[name] == other.stats[name]
+    for name in ("x", "y", "theta", "omega", "energy", "rolling_residual"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def test_a_call_does_little_besides_its_steps():
