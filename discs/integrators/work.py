@@ -107,7 +107,7 @@ class Frame(NamedTuple):
 
     lost : a disc that lost its heading in the compiled step to the frame, or -1. If there is one, the rest is undefined.
     seen : q, energy and largest slip, if the compiled form computed them.
-    spent : (2,), work of loads and dissipated energy since the last step.
+    spent : (2,), work of loads and dissipated energy since the last step; with `Work.shares` (2, 1 + L).
     """
 
     hi: Float

@@ -84,14 +84,14 @@ def arranged(chain: Slaved) -> Laned:
 class Workspace(NamedTuple):
     """Workspace, (3, n' + 2 HALO): base, links of the base position; links, of a moved one; half, half a step. c : (3, n' + HALO).
 
-    rhs : (1, n'). spare : (LANES,).
+    b : (1, n'). spare : (LANES,).
     """
 
     base: NDArray
     links: NDArray
     half: NDArray
     c: NDArray
-    rhs: NDArray
+    b: NDArray
     spare: NDArray
     matrix: Matrix
 
@@ -189,11 +189,6 @@ def moved(chain, base, move, d):
 @fill(do.spend, Laned)
 def _spend(chain, state, t, weight, move, v, scale):
     do.spend(chain.load, state, t, weight, move, v, scale)
-
-
-@fill(do.mean_pullback, Laned)
-def _mean_pullback(chain, work, state, t, move, c, p, g):
-    pass  # for motors, which discs in lanes do not have
 
 
 @fill(do.vanishing, Laned)

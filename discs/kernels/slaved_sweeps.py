@@ -136,7 +136,7 @@ def assemble(chain, c, one, g, m):
 
 @fill(do.sweep, Laned)
 def _sweep(chain, work, state, t, h, p, move, first):
-    c, q, b, half, start = work.c, p[0], work.rhs[0], 0.5 * h, state.pi[0]
+    c, q, b, half, start = work.c, p[0], work.b[0], 0.5 * h, state.pi[0]
     moved(chain, work.base, move, work.links)
     frozen(chain, work, half, q, c)
     pulled(chain, work, c, b)

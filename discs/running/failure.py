@@ -1,6 +1,9 @@
-"""The error of a run that failed."""
+"""The error of a run that failed, and its words."""
 
 import numpy as np
+
+from discs.integrators import Integrator
+from discs.integrators.work import Frame
 
 
 class SimulationError(RuntimeError):
@@ -18,3 +21,28 @@ class SimulationError(RuntimeError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.message, self.step, self.time, self.disc, self.slope)
+
+
+def lost_heading(law: str | None, step: int, time: float, disc: int, slope: float) -> SimulationError:
+    """The error of a run in which |r'| of a disc vanishes; it was `slope` one step before."""
+    said = (
+        f"a disc lost its heading: its neighbours met, r' = 0, and rolling={law!r} has no direction there; "
+        "end the run earlier, or take a smaller dt if the motion is not resolved"
+    )
+    return SimulationError(said, step, time, disc, slope)
+
+
+def blown_up(
+    integrator: Integrator, h: float, kinetic: float, frame: Frame, unconverged: int, step: int, time: float
+) -> SimulationError:
+    """The error of a run whose kinetic energy is too large at a frame, after a number of unconverged steps."""
+    speed = np.abs(frame.rate[2])
+    disc = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
+    if np.isfinite(integrator.stability_limit):
+        cause = f"dt = {h:g} is above the stability limit of {integrator.name!r}: take a smaller dt or 'midpoint'"
+    elif unconverged:
+        cause = f"dt = {h:g} is too large for the iteration to converge: take a smaller dt or 'midpoint'"
+    else:
+        cause = "rounding dominates the steps: take a smaller dt, fewer discs or softer springs"
+    what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
+    return SimulationError(f"the run blew up, {what}; likely {cause}", step, time, disc)

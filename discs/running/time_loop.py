@@ -11,7 +11,7 @@ from discs.loads.motor import Held
 from discs.loads.shares import Shares
 from discs.problem import Problem
 from discs.running.album import Album
-from discs.running.failure import SimulationError
+from discs.running.failure import SimulationError, blown_up, lost_heading
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, converging
@@ -281,29 +281,11 @@ class March:
 
     def _check_heading(self, lost: int | None, step: int, time: float, before: Memory) -> None:
         if lost is not None:
-            law = getattr(self.problem.chain, "rolling", None)
-            slope = np.hypot(*self.system.slope(self.system.shape(before.hi, before.lo)))[lost]
-            raise SimulationError(
-                f"a disc lost its heading: its neighbours met, r' = 0, and rolling={law!r} has no direction there; "
-                "end the run earlier, or take a smaller dt if the motion is not resolved",
-                step,
-                time,
-                lost,
-                float(slope),
-            )
+            slope = float(np.hypot(*self.system.slope(self.system.shape(before.hi, before.lo)))[lost])
+            raise lost_heading(getattr(self.problem.chain, "rolling", None), step, time, lost, slope)
 
     def _check_energy(self, kinetic: float, frame: Frame | None, step: int, time: float) -> None:
         if kinetic <= self.bound:
             return
         frame = frame or self.integrator.at(self.system, self.memory, time, 0.0, self.h, self.work, None)
-        speed = np.abs(frame.rate[2])
-        disc = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
-        if np.isfinite(self.integrator.stability_limit):
-            name = self.integrator.name
-            cause = f"dt = {self.h:g} is above the stability limit of {name!r}: take a smaller dt or 'midpoint'"
-        elif self.work.unconverged:
-            cause = f"dt = {self.h:g} is too large for the iteration to converge: take a smaller dt or 'midpoint'"
-        else:
-            cause = "rounding dominates the steps: take a smaller dt, fewer discs or softer springs"
-        what = "kinetic energy above ten times the total" if np.isfinite(kinetic) else "values are not finite"
-        raise SimulationError(f"the run blew up, {what}; likely {cause}", step, time, disc)
+        raise blown_up(self.integrator, self.h, kinetic, frame, self.work.unconverged, step, time)
