@@ -148,6 +148,6 @@ class SlavedSystem(RollingDiscs):
         """The same parameters in lanes (`discs.kernels.slaved_lanes`), for methods that take them; None for few discs."""
         if self.load is not None or not isinstance(self._springs, LinearCurvature):
             return None
-        from discs.kernels import slaved_lanes, slaved_sweeps  # noqa: F401, the sweeps too
+        from discs.kernels import slaved_lanes, slaved_stages  # noqa: F401, and the sweeps
 
         return slaved_lanes.arranged(self.parameters) if self.n >= slaved_lanes.MANY else None

@@ -104,6 +104,7 @@ class Collocated(OneStep, ABC):
     stages: ClassVar[int]
     stability_limit: ClassVar[float] = np.inf
     takes_motors: ClassVar[bool] = True
+    in_lanes: ClassVar[bool] = True
 
     @property
     @abstractmethod

@@ -236,12 +236,38 @@ def _room(method: Collocation, chain: Any, state: Phase) -> Room:
     return Room(np.empty(s), moves, v, p, force, rest, do.stages(chain, method, rows, columns))
 
 
+@fill(do.refine, object, forceinline=True)
+def _refine(chain: Any, work: Any, method: Collocation, room: Room, before: Phase, h: float, sweep: int) -> float:
+    times, moves, v, p, force, rest, stages = room
+    pi, c, a, s = before.pi, stages.c, method.tableau.a, method.tableau.b.size
+    # C at the stages, velocities with it, and forces at the stages that these give
+    for i in range(s):
+        combine(a[i], v, h, moves[i])
+    do.bases(chain, work, moves, c)
+    do.forwards(chain, work, c, p, v)
+    for i in range(s):
+        combine(a[i], v, h, moves[i])
+    do.forces(chain, work, before, times, moves, c, p, force)
+    for i in range(s):
+        combine(a[i], force, -h, rest[i])
+        for row in range(pi.shape[0]):
+            for k in range(pi.shape[1]):
+                rest[i, row, k] += pi[row, k] - p[i, row, k]
+    do.solve(chain, method, room, h)
+    for i in range(s):
+        for row in range(pi.shape[0]):
+            for k in range(pi.shape[1]):
+                p[i, row, k] += force[i, row, k]
+    do.forwards(chain, work, c, p, v)
+    furthest: float = do.moved(chain, method, room, sweep, h)
+    return furthest
+
+
 @fill(do.step, Collocation, forceinline=True)
 @part
 def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Phase, after: Phase, t: float, h: float) -> Cost:
-    times, moves, v, p, force, rest, stages = room
-    rule, pi, c = method.tableau, before.pi, stages.c
-    a, s = rule.a, rule.b.size
+    times, moves, v, p = room.times, room.moves, room.v, room.p
+    rule, pi, s = method.tableau, before.pi, method.tableau.b.size
     for i in range(s):
         times[i] = t + rule.nodes[i] * h
         copy(pi, p[i])
@@ -250,26 +276,7 @@ def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Ph
     while unsettled(method, sweep, moved):
         if interrupted():
             return CUT
-        # C at the stages, velocities with it, and forces at the stages that these give
-        for i in range(s):
-            combine(a[i], v, h, moves[i])
-        do.bases(chain, work, moves, c)
-        do.forwards(chain, work, c, p, v)
-        for i in range(s):
-            combine(a[i], v, h, moves[i])
-        do.forces(chain, work, before, times, moves, c, p, force)
-        for i in range(s):
-            combine(a[i], force, -h, rest[i])
-            for row in range(pi.shape[0]):
-                for k in range(pi.shape[1]):
-                    rest[i, row, k] += pi[row, k] - p[i, row, k]
-        do.solve(chain, method, room, h)
-        for i in range(s):
-            for row in range(pi.shape[0]):
-                for k in range(pi.shape[1]):
-                    p[i, row, k] += force[i, row, k]
-        do.forwards(chain, work, c, p, v)
-        moved = do.moved(chain, method, room, sweep, h)
+        moved = do.refine(chain, work, method, room, before, h, sweep)
         sweep += 1
     do.finish(chain, work, method, room, before, h)
     move = moves[0]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from discs.kernels import blocks
 from discs.kernels.compiled import part
 from discs.kernels.steered_matrix import border, solve_border
-from discs.kernels.vectors import LANES, after, before, load, store, zero
+from discs.kernels.vectors import LANES, after, before, load, store
 
 HALO = 2 * LANES
 LEAD = LANES + 1  # rows that may be coupled around a ring
@@ -39,7 +39,7 @@ class Order(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """A factored matrix, (n',) in lanes: 1/a, u/a, w/a, p/a, q/a.
+    """A factored matrix, real or complex, (n',) in lanes: 1/a, u/a, w/a, p/a, q/a.
 
     lead : (2, LANES LEAD), couplings around a ring, 0 elsewhere. inner : (LANES,), 1 but 0 in the first lane. corner : (2,). ends :
     (2, 4), multipliers and reciprocal pivots of the end discs. d, o, columns, edge : of the separators, see
@@ -71,13 +71,22 @@ def order(n: int) -> Order:
 
 
 @part(_nrt=True)
-def workspace(order):
-    """A matrix of zeros."""
-    n, e = LANES * order.rows, np.zeros
-    inner = np.ones(LANES)
+def matrices(order, g, count):
+    """Workspace for `count` matrices of zeros, real or complex as g."""
+    n, kind, inner = LANES * order.rows, np.array([g]).dtype, np.ones(LANES)
     inner[0] = 0.0
-    of_separators = e((3, LANES)), e((4, LANES)), e((2, 2, LANES)), e(11), e((2, LANES))
-    return Matrix(e(n), e(n), e(n), e(n), e(n), e((2, LANES * LEAD)), inner, e(2), e((2, 4)), *of_separators)
+    a, u, w, p, q = np.zeros((5, count, n), kind)
+    lead, corner, ends = np.zeros((count, 2, LANES * LEAD), kind), np.zeros((count, 2), kind), np.zeros((count, 2, 4), kind)
+    d, o, rest = np.zeros((count, 3, LANES), kind), np.zeros((count, 4, LANES), kind), np.zeros((count, 2, LANES), kind)
+    columns, edge = np.zeros((count, 2, 2, LANES), kind), np.zeros((count, 11), kind)
+    return Matrix(a, u, w, p, q, lead, inner, corner, ends, d, o, columns, edge, rest)
+
+
+@part
+def pick(m, j):
+    """One of the matrices of `matrices`."""
+    lead, corner, ends, d, o, columns, edge = m.lead[j], m.corner[j], m.ends[j], m.d[j], m.o[j], m.columns[j], m.edge[j]
+    return Matrix(m.a[j], m.u[j], m.w[j], m.p[j], m.q[j], lead, m.inner, corner, ends, d, o, columns, edge, m.rest[j])
 
 
 @part
@@ -131,7 +140,7 @@ def factor(order, ring, corners, m):
     q0 = load(lead[1], 0) + inner * before(load(u, last))
     p1, q1 = load(lead[0], LANES), load(lead[1], LANES) + inner * before(load(w, last))
     a0, u0, a1 = load(a, 0), load(u, 0), load(a, LANES)
-    pp, pq, qq = zero(), zero(), zero()
+    pp, pq, qq = 0.0 * a0, 0.0 * a0, 0.0 * a0
     for row in range(order.rows - 2):
         i = LANES * row
         top, second = 1.0 / a0, load(w, i)
@@ -166,13 +175,15 @@ def factor(order, ring, corners, m):
 @part
 def solve(order, ring, corners, m, b):
     """Solve with the factors of `factor`, b (n',) in place."""
-    n, ends, first, last, one, other = order.n, m.ends, 0.0, 0.0, order.places[0], order.places[order.n - 1]
+    n, ends, one, other = order.n, m.ends, order.places[0], order.places[order.n - 1]
+    first, last = b[one], b[other]
     if corners:
-        first, last, b[one], b[other] = b[one], b[other], 0.0, 0.0
+        b[one], b[other] = 0.0, 0.0
         for k in range(3):
             b[order.places[k + 1]] -= ends[0, k] * first
             b[order.places[n - 2 - k]] -= ends[1, k] * last
-    b0, b1, at_p, at_q = load(b, 0), load(b, LANES), zero(), zero()
+    b0, b1 = load(b, 0), load(b, LANES)
+    at_p, at_q = 0.0 * b0, 0.0 * b0
     for row in range(order.rows - 2):
         i = LANES * row
         store(b, i, b0)

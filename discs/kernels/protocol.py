@@ -158,6 +158,11 @@ def moved(chain, method, room, sweep, h):
 
 
 @stub
+def refine(chain, work, method, room, before, h, sweep):
+    """One sweep of a step from `before`, number `sweep` from 0: changes p and v of the stages; returns what `moved` does."""
+
+
+@stub
 def finish(chain, work, method, room, before, h):
     """After the last sweep of a step from `before`: book the work of loads, at the positions and velocities of the last stages."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
-from discs.kernels.lanes import HALO, Matrix, Order, join, order, workspace
+from discs.kernels.lanes import HALO, Matrix, Order, join, matrices, order, pick
 from discs.kernels.limits import LOST_HEADING
 from discs.kernels.shared import disc_by_disc
 from discs.kernels.slaved import Slaved
@@ -28,8 +28,7 @@ class Laned(NamedTuple):
 
     order: Order
     radius: NDArray
-    mass: NDArray
-    spin: NDArray
+    weights: NDArray
     bend: NDArray
     torsion: NDArray
     hessian: NDArray
@@ -56,6 +55,8 @@ def arranged(chain: Slaved) -> Laned:
             join(lanes, ring, to)
         return to
 
+    weights = put(chain.weights)
+    weights[2, weights[2] == 0.0] = 1.0  # what belongs to no disc
     bend, springs, torsion = links.bend.copy(), np.zeros(2), links.torsion.copy()
     if chain.ends == GHOST:
         springs[:], bend[[0, -1]] = bend[[0, -1]], 0.0
@@ -64,8 +65,7 @@ def arranged(chain: Slaved) -> Laned:
     return Laned(
         lanes,
         put(chain.radius),
-        put(chain.weights[0]),
-        put(chain.weights[2], 1.0),
+        weights,
         put(bend, halo=HALO),
         put(torsion, halo=HALO),
         put(links.hessian),
@@ -84,7 +84,7 @@ def arranged(chain: Slaved) -> Laned:
 class Workspace(NamedTuple):
     """Workspace, (3, n' + 2 HALO): base, links of the base position; links, of a moved one; half, half a step. c : (3, n' + HALO).
 
-    b : (1, n'). spare : (LANES,).
+    b : (1, n'). spare : (LANES,). matrix : one of `lanes.matrices`.
     """
 
     base: NDArray
@@ -100,7 +100,17 @@ class Workspace(NamedTuple):
 def _workspace(chain):
     n = chain.radius.size
     base, links, half = np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO))
-    return Workspace(base, links, half, np.zeros((3, n + HALO)), np.zeros((1, n)), np.empty(LANES), workspace(chain.order))
+    return Workspace(base, links, half, np.zeros((3, n + HALO)), np.zeros((1, n)), np.empty(LANES), matrices(chain.order, 1.0, 1))
+
+
+@fill(do.factors, Laned, _nrt=True)
+def _factors(chain, g, count):
+    return matrices(chain.order, g, count)
+
+
+@fill(do.pick, Laned)
+def _pick(chain, m, j):
+    return pick(m, j)
 
 
 @fill(do.place, Laned)

@@ -7,7 +7,7 @@ import numpy as np
 
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
-from discs.kernels.lanes import HALO, factor, join, solve
+from discs.kernels.lanes import HALO, factor, join, pick, solve
 from discs.kernels.slaved_lanes import Laned, moved
 from discs.kernels.slaved_matrix import GHOST, RING
 from discs.kernels.vectors import LANES, after, larger, largest, load, store, zero
@@ -19,7 +19,7 @@ END = 2.0, -5.0, 4.0, -1.0  # r_-1 - 2 r_0 + r_1 with the ghost disc r_-1 of a c
 def contact(chain, i, x, y):
     """C of the discs i ... i + LANES - 1, for the sums of their two links."""
     a, b, e, square = do.contact(chain.rolling, load(chain.radius, i), 0.5 / chain.k, x, y)
-    t = 1.0 / np.sqrt(load(chain.spin, i) + load(chain.mass, i) * square)
+    t = 1.0 / np.sqrt(load(chain.weights[2], i) + load(chain.weights[0], i) * square)
     e = e * t
     return -b * e, a * e, t
 
@@ -39,9 +39,9 @@ def _basis(chain, work, move, c):
 
 
 @part
-def frozen(chain, work, tau, p, c):
-    """c = C for the moved links, and work.half = tau C p."""
-    dx, dy, cx, cy, ct, half = work.links[0], work.links[1], c[0], c[1], c[2], work.half
+def frozen(chain, work, tau, p, c, move, start):
+    """c = C for the moved links, and tau C p in `move`, (3, at least n'), from the entry `start` on."""
+    dx, dy, cx, cy, ct = work.links[0], work.links[1], c[0], c[1], c[2]
     x, y = load(dx, HALO), load(dy, HALO)
     for i in range(0, chain.radius.size, LANES):
         j = HALO + i
@@ -51,9 +51,9 @@ def frozen(chain, work, tau, p, c):
         store(cx, i, a)
         store(cy, i, b)
         store(ct, i, t)
-        store(half[0], j, a * r)
-        store(half[1], j, b * r)
-        store(half[2], j, t * r)
+        store(move[0], start + i, a * r)
+        store(move[1], start + i, b * r)
+        store(move[2], start + i, t * r)
         x, y = next_x, next_y
 
 
@@ -90,6 +90,8 @@ def pulled(chain, work, c, g):
         pull = load(cx, i) * (tension_x - next_x) + load(cy, i) * (tension_y - next_y) + load(ct, i) * (tension - next_)
         store(g, i, pull)
         moment_x, moment_y, tension_x, tension_y, tension = after_x, after_y, next_x, next_y, next_
+    for i in range(chain.order.first):
+        g[LANES * i] = 0.0
     if chain.ends == GHOST:
         pull_ends(chain, work, c, g)
 
@@ -138,15 +140,14 @@ def assemble(chain, c, one, g, m):
 def _sweep(chain, work, state, t, h, p, move, first):
     c, q, b, half, start = work.c, p[0], work.b[0], 0.5 * h, state.pi[0]
     moved(chain, work.base, move, work.links)
-    frozen(chain, work, half, q, c)
+    frozen(chain, work, half, q, c, work.half, HALO)
     pulled(chain, work, c, b)
     for i in range(0, b.size, LANES):
         store(b, i, load(start, i) - load(q, i) - half * load(b, i))
-    for i in range(chain.order.first):
-        b[LANES * i] = 0.0
-    assemble(chain, c, 1.0, half * half, work.matrix)
-    factor(chain.order, chain.ends == RING, chain.ends == GHOST, work.matrix)
-    solve(chain.order, chain.ends == RING, chain.ends == GHOST, work.matrix, b)
+    matrix = pick(work.matrix, 0)
+    assemble(chain, c, 1.0, half * half, matrix)
+    factor(chain.order, chain.ends == RING, chain.ends == GHOST, matrix)
+    solve(chain.order, chain.ends == RING, chain.ends == GHOST, matrix, b)
     cx, cy, ct, x, y, theta = c[0], c[1], c[2], move[0], move[1], move[2]
     far_x, far_y, far = zero(), zero(), zero()
     for i in range(0, b.size, LANES):
@@ -171,3 +172,26 @@ def _pullback(chain, work, state, t, move, c, p, g):
         for i in range(0, x.size, LANES):
             store(to, HALO + i, load(x, i))
     pulled(chain, work, c, g[0])
+
+
+@fill(do.stiffness, Laned)
+def _stiffness(chain, work, move, c, matrix):
+    for axis in range(3):
+        for i in range(0, matrix.a.size, LANES):
+            store(work.c[axis], i, load(c[axis], i))
+    assemble(chain, work.c, 0.0, 1.0, matrix)
+
+
+@fill(do.precondition, Laned)
+def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
+    for i in range(stiff.a.size):
+        matrix.a[i] = 1 + g * stiff.a[i]
+        matrix.u[i] = g * stiff.u[i]
+        matrix.w[i] = g * stiff.w[i]
+    matrix.corner[0], matrix.corner[1] = g * stiff.corner[0], g * stiff.corner[1]
+    factor(chain.order, chain.ends == RING, chain.ends == GHOST, matrix)
+
+
+@fill(do.correct, Laned)
+def _correct(chain, matrix, r):
+    solve(chain.order, chain.ends == RING, chain.ends == GHOST, matrix, r[0])

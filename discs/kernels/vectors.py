@@ -2,7 +2,8 @@
 
 In plain Python a vector is an array (LANES,). In compiled code it is one value, which LLVM keeps in registers; +, -, *, / and a
 change of sign take vectors, or a vector and a number; `abs` and `numpy.sqrt` take one. So a formula for numbers, a law of rolling
-for instance, serves for vectors too.
+for instance, serves for vectors too. From arrays of complex numbers come complex vectors, pairs of vectors in compiled code; they
+take +, -, *, a change of sign, and 1/z.
 """
 
 from typing import Any
@@ -27,6 +28,11 @@ def load(a, i):
 def store(a, i, v):
     """Put a vector into a (n,), contiguous, from i on."""
     a[i : i + LANES] = v
+
+
+def pair(v, w):
+    """v + i w."""
+    return v + 1j * w
 
 
 def larger(v, w):
@@ -60,7 +66,7 @@ def _forms() -> None:
     from llvmlite import ir
     from numba.core import cgutils, types
     from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-    from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+    from numba.extending import intrinsic, lower_builtin, make_attribute_wrapper, models, overload, register_model
 
     values = ir.VectorType(ir.DoubleType(), LANES)
 
@@ -73,7 +79,18 @@ def _forms() -> None:
         def __init__(self, manager: Any, kind: Any) -> None:
             super().__init__(manager, kind, values)
 
-    vector = Vector()
+    class Pair(types.Type):
+        def __init__(self) -> None:
+            super().__init__("complex vector")
+
+    @register_model(Pair)
+    class _PairModel(models.StructModel):
+        def __init__(self, manager: Any, kind: Any) -> None:
+            super().__init__(manager, kind, [("real", vector), ("imag", vector)])
+
+    vector, complex_vector = Vector(), Pair()
+    for name in ("real", "imag"):
+        make_attribute_wrapper(Pair, name, name)
 
     def spread(context: Any, builder: Any, value: Any, kind: Any) -> Any:
         """The value of a number in all lanes."""
@@ -86,7 +103,7 @@ def _forms() -> None:
 
     class Arithmetic(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            if any(isinstance(a, Vector) for a in args) and all(isinstance(a, Vector | types.Number) for a in args):
+            if any(isinstance(a, Vector) for a in args) and all(isinstance(a, Vector | types.Float | types.Integer) for a in args):
                 return signature(vector, *args)
             return None
 
@@ -109,23 +126,48 @@ def _forms() -> None:
         data = context.make_array(kind)(context, builder, a).data
         return builder.bitcast(builder.gep(data, [i]), ir.PointerType(values))
 
+    def mixed(builder: Any, v: Any, w: Any, entries: Any) -> Any:
+        """A vector of some of the 2 LANES entries of two vectors."""
+        return builder.shuffle_vector(v, w, ir.Constant(ir.VectorType(ir.IntType(32), LANES), list(entries)))
+
+    def paired(context: Any, builder: Any, real: Any, imag: Any) -> Any:
+        made = cgutils.create_struct_proxy(complex_vector)(context, builder)
+        made.real, made.imag = real, imag
+        return made._getvalue()
+
     @intrinsic
     def _zero(typing: Any) -> Any:
         return vector(), lambda context, builder, sig, args: ir.Constant(values, [0.0] * LANES)
 
     @intrinsic
-    def _load(typing: Any, a: Any, i: Any) -> Any:
-        def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            found = builder.load(place(context, builder, sig.args[0], *args))
-            found.align = 8
-            return found
+    def _pair(typing: Any, v: Any, w: Any) -> Any:
+        return complex_vector(v, w), lambda context, builder, sig, args: paired(context, builder, *args)
 
-        return vector(a, types.intp), emit
+    @intrinsic
+    def _load(typing: Any, a: Any, i: Any) -> Any:
+        of_complex = isinstance(a.dtype, types.Complex)
+
+        def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            start = place(context, builder, sig.args[0], *args)
+            found = [builder.load(builder.gep(start, [ir.IntType(64)(k)])) for k in range(1 + of_complex)]
+            for one in found:
+                one.align = 8
+            if not of_complex:
+                return found[0]
+            return paired(context, builder, *(mixed(builder, found[0], found[1], range(k, 2 * LANES, 2)) for k in range(2)))
+
+        return (complex_vector if of_complex else vector)(a, types.intp), emit
 
     @intrinsic
     def _store(typing: Any, a: Any, i: Any, v: Any) -> Any:
         def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            builder.store(args[2], place(context, builder, sig.args[0], *args[:2])).align = 8
+            start, parts = place(context, builder, sig.args[0], *args[:2]), [args[2]]
+            if isinstance(sig.args[2], Pair):
+                given = cgutils.create_struct_proxy(complex_vector)(context, builder, args[2])
+                order = [lane // 2 + lane % 2 * LANES for lane in range(2 * LANES)]
+                parts = [mixed(builder, given.real, given.imag, half) for half in (order[:LANES], order[LANES:])]
+            for k, value in enumerate(parts):
+                builder.store(value, builder.gep(start, [ir.IntType(64)(k)])).align = 8
             return context.get_dummy_value()
 
         return types.void(a, types.intp, v), emit
@@ -138,11 +180,10 @@ def _forms() -> None:
         return vector(v, w), emit
 
     def turn(by: int) -> Any:
-        from_ = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [(lane + by) % LANES for lane in range(LANES)])
-
         @intrinsic
         def turned(typing: Any, v: Any) -> Any:
-            return vector(v), lambda context, builder, sig, args: builder.shuffle_vector(args[0], args[0], from_)
+            places = [(lane + by) % LANES for lane in range(LANES)]
+            return vector(v), lambda context, builder, sig, args: mixed(builder, args[0], args[0], places)
 
         return turned
 
@@ -162,11 +203,42 @@ def _forms() -> None:
     overload(zero)(lambda: lambda: _zero())
     overload(load)(lambda a, i: lambda a, i: _load(a, i))
     overload(store)(lambda a, i, v: lambda a, i, v: _store(a, i, v))
+    overload(pair)(lambda v, w: lambda v, w: _pair(v, w))
     overload(larger)(lambda v, w: lambda v, w: _larger(v, w))
-    overload(before)(lambda v: lambda v: back(v))
-    overload(after)(lambda v: lambda v: on(v))
     overload(np.sqrt)(lambda x: (lambda x: root(x)) if isinstance(x, Vector) else None)
     overload(abs)(lambda x: (lambda x: size(x)) if isinstance(x, Vector) else None)
+
+    def both(turned: Any) -> Any:
+        def form(v):
+            return (lambda v: _pair(turned(v.real), turned(v.imag))) if isinstance(v, Pair) else lambda v: turned(v)
+
+        return form
+
+    overload(before)(both(back))
+    overload(after)(both(on))
+
+    def pairs(a: Any, b: Any) -> tuple[bool, bool]:
+        """Which of two arguments are complex vectors; none if another one is no vector and no number."""
+        known = all(isinstance(x, Pair | Vector | types.Float | types.Integer) for x in (a, b))
+        return known and isinstance(a, Pair), known and isinstance(b, Pair)
+
+    sums: Any = {(True, True): lambda a, b: _pair(a.real + b.real, a.imag + b.imag)}
+    differences: Any = {(True, True): lambda a, b: _pair(a.real - b.real, a.imag - b.imag)}
+    products: Any = {
+        (True, True): lambda a, b: _pair(a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real),
+        (True, False): lambda a, b: _pair(a.real * b, a.imag * b),
+        (False, True): lambda a, b: _pair(a * b.real, a * b.imag),
+    }
+
+    def quotient(a, z):
+        scale = a / (z.real * z.real + z.imag * z.imag)
+        return _pair(z.real * scale, -z.imag * scale)
+
+    overload(operator.add)(lambda a, b: sums.get(pairs(a, b)))
+    overload(operator.sub)(lambda a, b: differences.get(pairs(a, b)))
+    overload(operator.mul)(lambda a, b: products.get(pairs(a, b)))
+    overload(operator.truediv)(lambda a, z: quotient if pairs(a, z) == (False, True) else None)
+    overload(operator.neg)(lambda a: (lambda a: _pair(-a.real, -a.imag)) if isinstance(a, Pair) else None)
 
 
 later(_forms)

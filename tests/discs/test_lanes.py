@@ -6,9 +6,10 @@ import pytest
 from compare import lump
 from continuum import untwisting_rod
 from discs import Midpoint, SimulationError, simulate
+from discs.integrators import METHODS
 from discs.kernels import lanes, vectors
 from discs.kernels.compiled import jit
-from discs.kernels.slaved_lanes import MANY
+from discs.kernels.slaved_lanes import MANY, Laned
 from discs.kernels.vectors import LANES, after, before, larger, largest, load, store, zero
 from tests.conftest import SLAVED, Model, models, uneven
 from tests.discs.test_kernels import CLOSE, dense_banded
@@ -26,6 +27,28 @@ def formula(a, b, out):
     store(out, 2 * LANES, after(v) + zero())
     store(out, 3 * LANES, larger(w, v))
     return largest(v, out[4 * LANES :])
+
+
+def of_complex(a, b, out):
+    v, w, x = load(a, 0), load(a, LANES), load(b, 0)
+    store(out, 0, (v - w * v) * (1.0 / w) + 2.0 * (x * v))
+    store(out, LANES, before(-v))
+    store(out, 2 * LANES, after(w * x))
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_complex_vectors(compiled):
+    rng = np.random.default_rng(6)
+    a, b, out = (
+        rng.standard_normal(2 * LANES) + 1j * rng.standard_normal(2 * LANES),
+        rng.standard_normal(LANES),
+        np.zeros(24, complex),
+    )
+    (jit(of_complex) if compiled else of_complex)(a, b, out)
+    v, w = a.reshape(2, LANES)
+    np.testing.assert_allclose(out[:LANES], (v - w * v) / w + 2 * b * v, rtol=1e-14)
+    np.testing.assert_array_equal(out[LANES : 2 * LANES], np.roll(-v, 1))
+    np.testing.assert_allclose(out[2 * LANES :], np.roll(w * b, -1), rtol=4e-16)
 
 
 @pytest.mark.parametrize("compiled", [True, False])
@@ -55,29 +78,28 @@ def test_vectors_are_computed_all_lanes_at_once():
     assert "divsd" not in assembly
 
 
-def test_elimination_in_lanes():
-    @jit
+@pytest.mark.parametrize("kind", [float, complex])
+def test_elimination_in_lanes(kind):
     def solve(order, ring, corners, m, b):
         lanes.factor(order, ring, corners, m)
         lanes.solve(order, ring, corners, m, b)
 
-    rng = np.random.default_rng(4)
+    compiled, rng = jit(solve), np.random.default_rng(4)
     for n in [*SIZES, 1000]:
         order = lanes.order(n)
         for ring, corners in ((False, False), (False, True), (True, False)):
-            m, b, entries = lanes.workspace(order), np.zeros(LANES * order.rows), rng.standard_normal((4, n))
-            entries[0] += 12
-            for array, values in zip((m.a, m.u, m.w, b), entries, strict=True):
-                array[:] = np.nan if array is m.u or array is m.w else 1.0  # what belongs to no disc
-                array[order.places] = values
+            m, b = lanes.pick(lanes.matrices(order, kind(1), 1), 0), np.zeros(LANES * order.rows, kind)
+            entries = rng.standard_normal((4, n)) + (1j * rng.standard_normal((4, n)) if kind is complex else 0)
             a, u, w, right = entries
+            a += 12
+            m.a[:] = 1.0
+            for array, values in zip((m.a, m.u, m.w, b), entries, strict=True):
+                array[order.places] = values
             m.corner[:] = rng.standard_normal(2) * corners
             matrix = dense_banded(a, u, w, m.corner)
             for i, j, value in ((n - 1, 0, u[-1]), (n - 2, 0, w[-2]), (n - 1, 1, w[-1])) if ring else ():
                 matrix[i, j] = matrix[j, i] = value
-            for array in (m.u, m.w):
-                array[np.isnan(array)] = 0.0
-            solve(order, ring, corners, m, b)
+            (solve if n == 65 else compiled)(order, ring, corners, m, b)
             np.testing.assert_allclose(b[order.places], np.linalg.solve(matrix, right), atol=1e-14, err_msg=f"{n}, {ring}")
 
 
@@ -99,6 +121,24 @@ def test_lanes_and_the_plain_engine_agree(model):
             assert a.stats["step_error"] == pytest.approx(b.stats["step_error"], rel=1e-9)
 
 
+@pytest.mark.parametrize("name", ["gauss4", "gauss6", "gauss8", "radau5"])
+@pytest.mark.filterwarnings("ignore:.*too long for this motion", "ignore:.*energy is conserved, but")
+def test_collocation_in_lanes_and_the_plain_engine_agree(name, kernels_as_python):
+    for ends, law in (("springs", "field"), ("consistent", "unit"), ("paper", "unit"), ("ring", "field")):
+        problem, method = uneven(65, Model(ends, law)), METHODS[name](sweeps=6, tolerance=0)
+        a, b = (simulate(problem, method, 0.03, [0.06, 0.07], (), False, engine) for engine in ("compiled", "plain"))
+        assert a.stats["engine"] == "compiled"
+        assert max(apart(a, b)) < CLOSE, (ends, law)
+
+
+def test_compiled_collocation_in_lanes():
+    twist = lump(untwisting_rod(duration=0.05), 513)
+    for problem in (uneven(64, Model("springs", "field")), uneven(65, Model("ring", "field")), twist):
+        a, b = (simulate(problem, "gauss6", 0.025, [0.05], (), False, engine) for engine in ("compiled", "plain"))
+        assert max(apart(a, b)) < CLOSE
+        assert a.energy[-1] == pytest.approx(problem.energy(), rel=1e-12)
+
+
 @pytest.mark.parametrize("n", [4097, 16385])
 def test_many_discs_in_lanes(n):
     problem = lump(untwisting_rod(duration=0.05), n, "consistent")
@@ -107,14 +147,16 @@ def test_many_discs_in_lanes(n):
     assert abs(a.energy[-1] - problem.energy()) < 4e-13  # a sum of 16385 terms: as measured disc by disc, too
 
 
-def test_the_number_of_discs_decides(monkeypatch):
-    """Fewer discs, and discs with loads, run disc by disc; compositions of midpoint steps take lanes too."""
-    few, many = (uneven(n, Model("springs", "field")) for n in (MANY - 1, MANY))
-    assert few.system.lanes is None
-    one = simulate(many, "suzuki4", 0.05, 1, progress=False)
-    monkeypatch.setitem(vars(many.system), "lanes", None)
-    other = simulate(many, "suzuki4", 0.05, 1, progress=False)
-    assert 0 < max(apart(one, other)) < CLOSE  # not the same kernel
+def test_the_number_of_discs_decides():
+    """Fewer discs, and explicit methods, run disc by disc."""
+    few, many = (uneven(n, Model("springs", "field")).system for n in (MANY - 1, MANY))
+    assert few.lanes is None
+    for name, method in METHODS.items():
+        if name in ("midpoint", "suzuki4", "gauss6", "radau5"):
+            assert isinstance(method().twin_of(many, many.parameters), Laned)
+            assert method().twin_of(few, few.parameters) is few.parameters
+        elif not method.adaptive:
+            assert method.in_lanes or method().twin_of(many, many.parameters) is many.parameters
 
 
 def test_a_lost_heading_is_that_of_its_disc():
