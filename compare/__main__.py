@@ -49,6 +49,9 @@ def parser() -> argparse.ArgumentParser:
         default=1e-7,
         help="largest error of the field, length and rad (default: 1e-7, for the ground's force)",
     )
+    p.add_argument(
+        "--degree", type=int, choices=(1, 2), default=1, help="2: discs of order four, too; a scene with own headings (default: 1)"
+    )
     p.add_argument("--no-limits", action="store_true", help="skip the discs with own headings (default scene only)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_main_job)
@@ -257,7 +260,7 @@ def run_main_job(options: argparse.Namespace) -> None:
         raise ValueError("--rolling is for the default scene; a scene file sets its law with the key 'rolling'")
     scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
     with background() as executor:
-        studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor)
+        studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor, options.degree)
         print(summary(studies))
         print(
             f"\nwritten to {options.out}: convergence.csv, convergence.png, limits-of-all.png, motion.png, energy.png\n", flush=True

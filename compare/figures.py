@@ -94,9 +94,12 @@ def slip(found: Sequence[Slips]) -> list[Axes]:
                 else values[len(each.epsilon) // 2] * (ends[0] / each.epsilon[len(each.epsilon) // 2]) ** 0.5
             )
             ax.loglog(ends, 0.6 * level * (ends / ends[0]) ** order, color=GREY, linewidth=1, label=f"slope {order:g}")
-        far.set(title=f"{each.scene.name}: distance from rolling discs", ylabel="largest distance at the end (length, rad)")
-        words = "slip" if ring else "slip: end discs (circles), inside (squares)"
-        at_ends.set(title=words, ylabel="largest |r. − e ω| at the end")
+        when = f"at t = {each.scene.duration:g}"
+        far.set(title=f"{each.scene.name}: distance from rolling discs", ylabel=f"largest distance {when} (length, rad)")
+        at_ends.set(title=f"{each.scene.name}: slip", ylabel=f"largest |dr/dt − e ω| {when} (length per time)")
+        if not ring:
+            at_ends.plot([], [], marker="o", markersize=4, color=GREY, label="end discs")
+            at_ends.plot([], [], marker="s", markersize=3, color=GREY, linestyle="--", label="discs inside")
         for ax in (far, at_ends):
             ax.set_xlabel("ε, from sliding (right) to rolling (left)")
             ax.grid(alpha=0.3, which="major")

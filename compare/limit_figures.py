@@ -28,7 +28,7 @@ def limits_of_all(studies: Sequence[Study]) -> list[Axes]:
     axes = list(figure.subplots(1, len(studies), squeeze=False, sharey=True)[0])
     for ax, study in zip(axes, studies, strict=True):
         limits_of(study, ax)
-        ax.set_title(KIND["own" if study.scene.steered else study.ends])
+        ax.set_title(KIND[study.ends])
     axes[0].set_ylabel("error; of energy and force relative to the field's largest value")
     scene = studies[0].scene
     figure.suptitle(f"Not only the positions converge: {scene.name}, {scene.rolling} law, t = {scene.duration:g}")
@@ -43,7 +43,7 @@ def limits_of(study: Study, ax: Axes) -> None:
         words, style = WANTED[name]
         ax.plot(study.n, error, marker="o", markersize=4, label=words, **style)
     n = study.n[[0, -1]].astype(float)
-    slope = 1 if study.ends == "springs" and not study.scene.steered and study.scene.rod.curvature == "linear" else 2
+    slope = 4 if study.ends == "elements" else 1 if study.ends == "springs" and study.scene.rod.curvature == "linear" else 2
     line = 0.5 * errors.min(axis=1)[0] * (n / n[0]) ** -slope
     ax.plot(n, line, color=INK, linewidth=1)
     ax.text(n[1], line[1], f"slope −{slope}    ", ha="right", va="center")

@@ -3,7 +3,7 @@
 import csv
 import time
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -141,7 +141,6 @@ def limits(
         bar.update()
         studies = [future.result() for future in beside]
         studies = studies or [convergence(scene, n, field=field, progress=False, degree=d) for d in (1, 2)]
-        studies[0] = replace(studies[0], ends="own")
         bar.update()
         rows: list[tuple[str, ...]] = [("against", "A", "G", "J", "distance x", "distance y", "distance theta")]
         for d in (unit, *paper):

@@ -30,6 +30,7 @@ def overview(
     tol: float = 1e-7,
     progress: bool = True,
     executor: Executor | None = None,
+    degree: int = 1,
 ) -> list[Study]:
     """Compare a scene's discs with its field; write the table and the pictures to `out`.
 
@@ -41,14 +42,17 @@ def overview(
     ----------
     executor : a `concurrent.futures` executor that runs energies and plain springs in parallel; processes need a scene that can be
         pickled.
+    degree : 2 to compare discs of order four beside those of order two; own headings only.
 
     Returns
     -------
-    The studies, one for each kind of ends.
+    The studies, one for each kind of ends or links.
     """
-    kinds = ("springs",) if scene.closed or scene.steered else ("springs", "consistent")
-    for ends in kinds:
-        checked_sizes(scene, n, ends)
+    kinds = [("springs", 1)] if scene.closed or scene.steered else [("springs", 1), ("consistent", 1)]
+    if degree != 1:
+        kinds.append(("springs", degree))
+    for ends, of_links in kinds:
+        checked_sizes(scene, n, ends, of_links)
     from compare import figures, limit_figures  # and matplotlib, for the process that draws
 
     long = scene if scene.closed else replace(scene, duration=LONG * scene.duration)
@@ -57,8 +61,9 @@ def overview(
         want = offered(scene)
         field = solve(scene, tol, frames=INSTANTS, progress=progress, want=want)
         study = partial(convergence, scene, n, field=field, want=want)
-        beside = [executor.submit(study, ends=kinds[0], progress=False)] if executor and len(kinds) > 1 else []
-        here = [study(ends=ends, progress=progress) for ends in kinds[len(beside) :]]
+        (ends, of_links), *others = kinds
+        beside = [executor.submit(study, ends=ends, degree=of_links, progress=False)] if executor and others else []
+        here = [study(ends=ends, degree=of_links, progress=progress) for ends, of_links in kinds[len(beside) :]]
         studies = [_awaited(future, "discs, plain ends", progress) for future in beside] + here
         write_csv(folder / "convergence.csv", studies)
         studies[0].plot(folder / "convergence.png", *studies[1:])

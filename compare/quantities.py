@@ -12,9 +12,12 @@ With lambda_i the force on disc i, w_i its share of the length, and the limit of
 
 All but the first two are relative to the largest value in the field at that time.
 
-The energy density of discs is rho |r.|^2/2 + alpha omega^2/2 + beta theta'^2/2 + K |r''|^2/2, with headings of their own that of
-the strains. Strains are taken at the discs: means of the two links beside one, at an end of the link there and a ghost link. (At
-the last few discs of a free end theta' is off at first order, and plain ends have no bending spring.)
+The energy per length of discs of order four is that of their elements, the mean over each, whose sum is the energy of the chain; it
+is compared with the field's mean over the same element.
+
+The energy density of other discs is rho |r.|^2/2 + alpha omega^2/2 + beta theta'^2/2 + K |r''|^2/2, with headings of their own
+that of the strains. Strains are taken at the discs: means of the two links beside one, at an end of the link there and a ghost
+link. (At the last few discs of a free end theta' is off at first order, and plain ends have no bending spring.)
 """
 
 from collections.abc import Iterable
@@ -27,8 +30,8 @@ from continuum.solver import spline
 from continuum.wants import INSIDE, smooth_tests
 from discs import Solution, checks
 from discs.arrays import Float
-from discs.chains import stencils
-from discs.chains.chain import Chain
+from discs.chains import elements, stencils
+from discs.chains.chain import Chain, SteeredChain
 from discs.loads import Rest
 from discs.mechanics.ground import end_forces, inner, inner_places
 
@@ -100,11 +103,20 @@ class Limit:
             if name in PAIRS:
                 found[name] = float(np.abs(np.stack([getattr(run, array)[-1] for array in PAIRS[name]]) - limit).max())
             elif name == "energy_density":
-                away = inner(run)
-                found["energy inside"] = _largest(energy_density(self._scene, run)[:, away], limit[:, away])
+                found["energy inside"] = self._of_the_energy(run, limit)
             else:
                 found |= self._of_the_ground(run, limit)
         return [found[name] for name in self.names]
+
+    def _of_the_energy(self, run: Solution, limit: Float) -> float:
+        assert run.problem is not None
+        chain, away = run.problem.chain, inner(run)
+        density = energy_density(self._scene, run)
+        if isinstance(chain, SteeredChain) and chain.degree == 2:
+            first, away = chain.s[::2][: density.shape[1]], away[1::2]
+            integral = self._splines["energy_density"].antiderivative()
+            limit = ((integral(first + 2 * chain.k) - integral(first)) / (2 * chain.k)).T
+        return _largest(density[:, away], limit[:, away])
 
     def _of_the_ground(self, run: Solution, limit: Float) -> dict[str, float]:
         assert run.problem is not None
@@ -122,7 +134,7 @@ class Limit:
 
 
 def energy_density(scene: Scene, run: Solution) -> Float:
-    """The energy density of discs at the last frame, (1, n), energy per length."""
+    """The energy density of discs at the last frame, (1, n), energy per length; of order four that of elements, (1, elements)."""
     assert run.problem is not None
     assert run.x_rate is not None
     assert run.y_rate is not None
@@ -145,11 +157,34 @@ def energy_density(scene: Scene, run: Solution) -> Float:
     turn = stencils.links(run.phi[-1], ends)
     if ends == "ring":
         turn[-1] += 2 * np.pi * chain.turns
+    if chain.degree == 2:
+        return _of_elements(scene, chain, run, np.stack([*d, stencils.links(run.theta[-1], ends), turn]))
     turns = stencils.extended(turn, ends) / k
     strain = np.exp(-1j * run.phi[-1]) * slope
     density = density + rod.heading_inertia * run.phi_rate[-1] ** 2 + rod.bending_stiffness * ((turns[1:] + turns[:-1]) / 2) ** 2
     whole: Float = density + rod.stretch_stiffness * (strain.real - 1) ** 2 + rod.shear_stiffness * strain.imag**2
     return 0.5 * whole[None]
+
+
+def _of_elements(scene: Scene, chain: SteeredChain, run: Solution, d: Float) -> Float:
+    """The mean energy density of each element, (1, elements), from links d of x, y, theta and phi (4, n_links)."""
+    assert run.x_rate is not None
+    assert run.y_rate is not None
+    assert run.phi is not None
+    assert run.phi_rate is not None
+    k, rod, there = chain.k, scene.rod.at(chain.s), scene.rod.at(chain.middles)
+    kinetic = rod.density * (run.x_rate[-1] ** 2 + run.y_rate[-1] ** 2) + rod.spin_inertia * run.omega[-1] ** 2
+    kinetic = kinetic + rod.heading_inertia * run.phi_rate[-1] ** 2
+    first = run.phi[-1] if chain.ends == "ring" else run.phi[-1, :-1]
+    slopes, heading = elements.at_points(d, first + d[3] / 2)
+    strain, twist, bend = np.exp(-1j * heading) * (slopes[0] + 1j * slopes[1]) / k - 1, slopes[2] / k, slopes[3] / k
+    elastic = there.stretch_stiffness * strain.real**2 + there.shear_stiffness * strain.imag**2
+    elastic = elastic + there.torsion_stiffness * twist**2 + there.bending_stiffness * bend**2
+    ends = kinetic[::2]
+    after = np.roll(ends, -1) if chain.ends == "ring" else ends[1:]
+    simpson = (ends[: after.size] + 4 * kinetic[1::2] + after) / 6
+    found: Float = 0.5 * (simpson + 0.5 * (elastic[::2] + elastic[1::2]))[None]
+    return found
 
 
 def _largest(found: Float, limit: Float) -> float:

@@ -23,7 +23,7 @@ class Study:
     Attributes
     ----------
     scene : the scene.
-    ends : kind of ends of the chains; "elements" for degree 2.
+    ends : kind of ends of the chains; "own" for own headings with free ends, "elements" for degree 2.
     n : (S,), numbers of discs.
     k : (S,), spacings, length.
     error : (S, fields), largest error over the discs of x, y (length), theta and, for own headings, phi (rad); then those of wanted

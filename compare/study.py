@@ -44,10 +44,6 @@ def convergence(
     """
     sizes, problems = checked_sizes(scene, n, ends, degree)
     want = check_want(want, scene)
-    if degree == 2 and "energy_density" in want:
-        raise ValueError(
-            "want: the energy density of discs of order four is not compared; leave 'energy_density' out, or take degree=1"
-        )
     if field is None:
         field = solve(scene, tol, frames=2, progress=progress, want=want)
     if field.error_estimate is None or not np.isclose(field.t[-1], scene.duration, rtol=1e-12):
@@ -68,7 +64,8 @@ def convergence(
         error[i] = *apart(scene, run, field), *more.errors(run)
     floor = max(field.error_estimate[name] for name in fields)
     k = np.array([problem.chain.k for problem in problems])
-    return Study(scene, "elements" if degree == 2 else problems[0].chain.ends, sizes, k, error, floor, h, more.names, more.floors)
+    kind = "elements" if degree == 2 else "own" if scene.steered and not scene.closed else problems[0].chain.ends
+    return Study(scene, kind, sizes, k, error, floor, h, more.names, more.floors)
 
 
 def apart(scene: Scene, run: Solution, field: Solution) -> Float:

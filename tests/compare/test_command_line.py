@@ -1,5 +1,6 @@
 """`python -m compare` as a user meets it."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -37,9 +38,13 @@ def test_limits_are_part_of_it(tmp_path, monkeypatch, capsys):
 def test_steered_scene(tmp_path, capsys):
     (tmp_path / "steered.toml").write_text('scene = "steered_rod"\nduration = 0.5\nshear_stiffness = 6.0\nradius = 0.7\n')
     out = tmp_path / "out"
-    assert main(["--scene", str(tmp_path / "steered.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-5", "--quiet"]) == 0
+    arguments = ["--scene", str(tmp_path / "steered.toml"), "--out", str(out), "--n", "9", "17", "--tol", "1e-5", "--degree", "2"]
+    assert main([*arguments, "--quiet"]) == 0
     assert sorted(p.name for p in out.iterdir()) == FILES
-    assert "error phi" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "error phi" in text
+    for kind in ("own", "elements"):
+        assert re.search(rf"^ *{kind} +17 ", text, re.MULTILINE)
 
 
 def test_closed_scene(tmp_path, monkeypatch, capsys):
@@ -54,6 +59,7 @@ def test_closed_scene(tmp_path, monkeypatch, capsys):
     ("arguments", "message"),
     [
         (["--n", "2"], "at least 3"),
+        (["--degree", "2"], "degree=2 needs discs with headings of their own"),
         (["--n", "33", "17"], "increasing whole numbers"),
         (["--tol", "-1"], "tol must be a positive"),
         (["--scene", "missing.toml"], "cannot be read"),

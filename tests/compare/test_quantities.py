@@ -2,12 +2,13 @@
 
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from compare import convergence, lump
-from compare.quantities import WANTS, energy_density
+from compare.quantities import WANTS, Limit, energy_density
 from continuum import breathing_ring, rolling_rod, solve, steered_rod, untwisting_rod
 from discs import simulate
 from discs.loads import Rest, Torque
@@ -53,6 +54,29 @@ def test_energy_density_adds_up():
     scene = breathing_ring(radius=0.7, density=1.3)
     run = simulate(lump(scene, 128), "midpoint", 0.01, 1, ("velocity",), progress=False)
     assert energy_density(scene, run).sum() * run.problem.chain.k == pytest.approx(run.energy[-1], rel=2e-3)
+
+
+@pytest.mark.parametrize("ring", [False, True])
+def test_energy_of_elements_adds_up_and_converges_at_order_four(ring):
+    """The sum over elements is the energy of the chain; against the field's means over elements the order is 3.8 to 4.2."""
+    scene = steered_rod(radius=0.7, density=1.3, duration=0.6)
+    if ring:
+        length = scene.rod.length
+        scene = replace(scene, initial=partial(waves, length), closed=True, shift=(length, 0.0))
+    limit = Limit(scene, solve(scene, 1e-8, frames=[0.6], want="energy_density", progress=False), ("energy_density",))
+    errors = []
+    for n in (16, 32, 64) if ring else (17, 33, 65):
+        run = simulate(lump(scene, n, degree=2), "gauss8", 0.02, 1, limit.of_discs, progress=False, engine="plain")
+        assert 2 * run.problem.chain.k * energy_density(scene, run).sum() == pytest.approx(run.energy[-1], rel=1e-13)
+        errors += limit.errors(run)
+    assert limit.names == ("energy inside",)
+    assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(4.0, abs=0.3)
+
+
+def waves(length, s):
+    """A straight line of discs that turn and roll unevenly along it, periodic up to its length."""
+    q = 2 * np.pi * s / length
+    return s, 0 * s, 0.4 * np.sin(q), 0.2 + 0.1 * np.cos(q), 0.1 * np.cos(q), 0 * s
 
 
 @pytest.fixture(scope="module")
