@@ -94,7 +94,8 @@ def end_forces(run: Solution, inside: Float | None = None) -> EndForces:
     values[1, :, 1] *= -1  # there s was the distance from the end
     if inside is None:
         bend = np.max(chain.bending_stiffness) / chain.length  # the couple that bends the rod; far smaller ones are rounding
-        _warn_if_rough(values, errors, (NEGLIGIBLE * bend / chain.length, NEGLIGIBLE * bend), chain.n)
+        no_couple = isinstance(chain, SteeredChain) or chain.curvature != "linear"  # in the limit: what is found of it is error
+        _warn_if_rough(values, errors, (NEGLIGIBLE * bend / chain.length, np.inf if no_couple else NEGLIGIBLE * bend), chain.n)
     return EndForces(*values, *errors)
 
 
@@ -117,7 +118,7 @@ def _warn_if_rough(values: Float, errors: Float, least: tuple[float, float], n: 
     rough = [
         f"{name} (up to {np.abs(value).max():.2g}) by about {error.max():.1g}"
         for name, value, error, negligible in zip(("force", "couple"), values, errors, least, strict=True)
-        if value.any() and error.max() > max(ROUGH * np.abs(value).max(), negligible)
+        if error.max() > max(ROUGH * np.abs(value).max(), negligible)
     ]
     if rough:
         warn(

@@ -126,6 +126,23 @@ def test_errors_of_end_forces_are_within_five_or_small(law):
     assert not warned[-1] or law == "field"
 
 
+@pytest.mark.parametrize("stretch", [0.0, 3.0])
+def test_true_curvature_has_no_couple_and_its_force_is_that_of_torsion_and_tension(stretch):
+    """f = beta theta' e/|e|^2 - A (|r'| - 1) r'/|r'| at s = 0, by theta' and r' of the discs (docs/ground-force.md)."""
+    rod = {"length": 3.7, "density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.5, "radius": 0.7}
+    scene = untwisting_rod("unit", curvature="true", stretch_stiffness=stretch, duration=2.0, **rod)
+    problem = lump(scene, 97, "consistent")
+    run = simulate(problem, "midpoint", 0.01, [2.0], ("contact_force",), progress=False)
+    found, k = end_forces(run), problem.chain.k
+    twist, slope = ((-3 * u[0] + 4 * u[1] - u[2]) / (2 * k) for u in (run.theta[0], run.x[0] + 1j * run.y[0]))
+    unit = slope / abs(slope)
+    force = 0.9 * twist / 0.7 * 1j * unit - stretch * (abs(slope) - 1) * unit
+    size = np.abs(found.force).max()
+    np.testing.assert_allclose(found.force[0, 0], [force.real, force.imag], atol=0.015 * size)
+    assert size > 0.5
+    assert np.abs(found.couple).max() < 1e-3
+
+
 @pytest.mark.slow
 def test_a_rod_that_rolls_straight_is_not_warned_of():
     """Its ground forces are rounding."""
