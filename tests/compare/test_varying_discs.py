@@ -1,5 +1,7 @@
 """Discs of rods whose parameters vary: places, equations with multipliers, energy, the limit of many discs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -7,7 +9,8 @@ from scipy.integrate import solve_ivp
 from compare import convergence, lump
 from continuum import Rod, solve, untwisting_rod
 from discs import simulate
-from tests.continuum.test_varying import AROUND, KINDS, LENGTH, OWN, VARYING, scene
+from discs.loads import Damping, Motor, Rest, Slope, Torque, signals
+from tests.continuum.test_varying import AROUND, KINDS, LENGTH, OWN, VARYING, scene, untwisting
 
 
 def by_multipliers(problem, kind):
@@ -117,3 +120,28 @@ def test_discs_tend_to_the_field(kind, ends, least, most):
     worst = found.error.max(axis=1)
     order = np.log(worst[0] / worst[1]) / np.log(found.k[0] / found.k[1])
     assert least < order < most, (found.error, order)
+
+
+@pytest.mark.slow  # kernels of chains
+def test_a_varying_rod_with_own_headings_has_order_two_under_loads():
+    """Against the elements, with a slope, dampers, a torque, rest shapes and a motor, all from the start on in motion or smooth."""
+    start = signals.smooth(0.0, 0.8)
+    loads = (
+        Slope(0.1, -0.2),
+        Damping(rolling=lambda s: 0.2 + 0.05 * s, turning=0.1, torsion=0.1),
+        Torque(lambda s: 0.3 * np.cos(s), start),
+        Rest(twist=lambda s: 0.1 * s, curvature=lambda s: 0.4 * np.sin(np.pi * s / LENGTH) ** 2, signal=start),
+        Motor(lambda t: 0.4 * float(start(t)), at=LENGTH),
+    )
+    loaded = replace(scene("steered"), loads=loads, initial=lambda s: (*untwisting(s), 0 * s, 0 * s))
+    field = solve(loaded, 1e-6, frames=2, progress=False)
+    off = []
+    for n in (33, 65, 129):
+        run = simulate(lump(loaded, n), "gauss6", 0.02, 2, progress=False)
+        assert abs(run.energy - run.energy[0] - run.work + run.dissipated).max() < 1e-6 * abs(run.energy).max()
+        places = np.abs(np.subtract.outer(run.s, field.s)).argmin(axis=1)
+        np.testing.assert_allclose(field.s[places], run.s, atol=1e-9)
+        off.append([abs(getattr(run, name)[-1] - getattr(field, name)[-1, places]).max() for name in ("x", "y", "theta", "phi")])
+    np.testing.assert_allclose(np.log2(np.divide(off[1], off[2])), 2, atol=0.06)
+    assert run.work[-1] > 0.01
+    assert run.dissipated[-1] > 0.01
