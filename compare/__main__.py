@@ -85,6 +85,7 @@ def add_trust(p: argparse.ArgumentParser) -> None:
         default=60.0,
         help="processor time for one run, s; references four times (default: 60)",
     )
+    p.add_argument("--loads", action="store_true", help="rods that vary, with loads")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_trust)
 
@@ -95,7 +96,8 @@ def run_trust(options: argparse.Namespace) -> None:
     archive = Path(options.out) / ("trust-runs.jsonl" if runs else "trust.jsonl")
     measure, collect, count = (trust_runs, runs_of, options.problems) if runs else (trust, gathered, options.scenes)
     try:
-        found = measure(count, options.seed, options.first, options.seconds, archive=archive, progress=not options.quiet)
+        given = options.seed, options.first, options.seconds
+        found = measure(count, *given, archive=archive, progress=not options.quiet, loads=options.loads)
     except KeyboardInterrupt:
         if archive.exists():
             write_trust(collect(read(archive)), options.out)

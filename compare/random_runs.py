@@ -21,9 +21,8 @@ from typing import Any
 import numpy as np
 
 from compare.lump import lump
-from compare.random_scenes import random_scene
 from compare.sweeps import Result, sweep
-from compare.trust import FRAMES, KNOWN, TimeUp, at_most
+from compare.trust import FRAMES, KNOWN, TimeUp, at_most, cases_of, scene_of
 from compare.trust_table import LEAST, MOST, OUTCOMES, Row, Trust
 from discs import Gauss8, Problem, SimulationError, Solution, checks, simulate
 from discs.arrays import Float
@@ -39,9 +38,12 @@ MOMENT = 1e-6  # a duration in which nothing moves
 SAME = 0.01  # relative: headings lost at times as close as this are the same
 
 
-def random_problem(seed: int, index: int) -> tuple[Problem, float, Row]:
-    """Problem number `index` of a seed, its tolerance, and a row that describes it; the same on every machine."""
-    drawn, rng = random_scene(seed, index), np.random.default_rng([seed, index, 2])
+def random_problem(seed: int, index: int, loads: bool = False) -> tuple[Problem, float, Row]:
+    """Problem number `index` of a seed, its tolerance, and a row that describes it; the same on every machine.
+
+    loads : whether the rod varies and has loads.
+    """
+    drawn, rng = scene_of([seed, index, 0.0, *[1.0] * loads]), np.random.default_rng([seed, index, 2])
     scene, n = drawn.scene, int(np.exp(rng.uniform(np.log(SIZES[0]), np.log(SIZES[1] + 1))))
     ends = "springs" if scene.steered else str(rng.choice(["springs", "consistent", "paper"]))
     law = "own" if scene.steered else scene.rolling
@@ -58,8 +60,8 @@ def random_problem(seed: int, index: int) -> tuple[Problem, float, Row]:
 
 
 def examine(case: list[float]) -> list[Any]:
-    """The row of a case [seed, index, seconds]; called in other processes."""
-    problem, tol, row = random_problem(int(case[0]), int(case[1]))
+    """The row of a case (`compare.trust.cases_of`); called in other processes."""
+    problem, tol, row = random_problem(int(case[0]), int(case[1]), len(case) > 3)
     seconds, found = float(case[2]), None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -169,12 +171,10 @@ def trust_runs(
     executor: Executor | None = None,
     archive: str | Path | None = None,
     progress: bool = True,
+    loads: bool = False,
 ) -> Runs:
     """Run random problems of discs to random tolerances, 1e-2 to 1e-8, and measure the errors; arguments as for `trust`."""
-    start = checks.whole("first", first, 0)
-    last = start + checks.whole("problems", problems, 1)
-    limit = checks.number("seconds", seconds, positive=True)
-    cases = [[checks.whole("seed", seed, 0), index, limit] for index in range(start, last)]
+    cases = cases_of(seed, first, checks.whole("problems", problems, 1), seconds, loads)
     return gathered(sweep(examine, cases, executor, archive, progress))
 
 

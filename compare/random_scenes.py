@@ -44,29 +44,29 @@ def random_scene(seed: int, index: int) -> Drawn:
     kind = KINDS[index % len(KINDS)]
     length = 4.0 * _factor(rng)
     parameters: dict[str, Any] = {name: value * _factor(rng) for name, value in PARAMETERS.items()}
-    duration, law = float(_between(rng, 0.5, 60.0)), str(rng.choice(["field", "unit"]))
+    duration, law = float(between(rng, 0.5, 60.0)), str(rng.choice(["field", "unit"]))
     closed, steered = kind in ("ring", "periodic", "own ring"), kind.startswith("own")
-    theta = _series(rng, length, closed, _between(rng, 0.1, 2.0))
-    rate = _series(rng, length, closed, _between(rng, 0.05, 1.0)) if kind in ("rolling", "own", "ring") else _zero
+    theta = series(rng, length, closed, between(rng, 0.1, 2.0))
+    rate = series(rng, length, closed, between(rng, 0.05, 1.0)) if kind in ("rolling", "own", "ring") else _zero
     words = [f"twist {np.ptp(theta(np.linspace(0, length, 999))):.2g} rad"]
     if kind == "bump" or (kind == "periodic" and rng.random() < 0.5):
-        width, place, height = _between(rng, length / 200, length / 4), rng.uniform(0.2, 0.8) * length, _between(rng, 0.1, 2.0)
+        width, place, height = between(rng, length / 200, length / 4), rng.uniform(0.2, 0.8) * length, between(rng, 0.1, 2.0)
         width = min(width, 0.1 * length if closed else width)  # its tails stay clear of the seam
         theta = _bump(height, place, width)
         words = [f"bump {height:.2g} rad, width l/{length / width:.0f}"]
     line: Line = _straight
     shift = (0.0, 0.0)
     if kind in ("bent", "bent end", "stretched", "own"):
-        bend = _between(rng, 0.2, 1.5) if kind != "stretched" else 0.0
+        bend = between(rng, 0.2, 1.5) if kind != "stretched" else 0.0
         stretch = rng.uniform(0.05, 0.4) * rng.choice([-1.0, 1.0]) if kind == "stretched" else 0.0
         line = _line(rng, length, bend, stretch, ends=kind == "bent end")
         words.append(f"bent by {bend:.2g} rad" if bend else f"|r'| up to {1 + abs(stretch):.2g}")
     elif kind in ("ring", "own ring"):
-        line = _ring(rng, length, _between(rng, 0.01, 0.15))
+        line = _ring(rng, length, between(rng, 0.01, 0.15))
     elif kind == "periodic":
-        line, shift = _wavy(rng, length, _between(rng, 0.005, 0.05)), (length, 0.0)
+        line, shift = _wavy(rng, length, between(rng, 0.005, 0.05)), (length, 0.0)
     if steered:
-        stretch, shear, inertia = _between(rng, 3.0, 100.0), _between(rng, 3.0, 100.0), _between(rng, 0.05, 0.5)
+        stretch, shear, inertia = between(rng, 3.0, 100.0), between(rng, 3.0, 100.0), between(rng, 0.05, 0.5)
         parameters |= {"stretch_stiffness": stretch, "shear_stiffness": shear, "heading_inertia": inertia}
         law, words = "unit", [*words, f"A = {stretch:.3g}, G = {shear:.3g}, J = {inertia:.2g}"]
     rod = (SteeredRod if steered else Rod)(length=length, **parameters)
@@ -95,20 +95,20 @@ class Initial:
         return (*fields, phi, 0 * s) if self.steered else fields
 
 
-def _between(rng: np.random.Generator, low: float, high: float) -> float:
+def between(rng: np.random.Generator, low: float, high: float) -> float:
     """A log-uniform random number."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def _factor(rng: np.random.Generator) -> float:
-    return _between(rng, 1 / FACTOR, FACTOR)
+    return between(rng, 1 / FACTOR, FACTOR)
 
 
 def _zero(s: Float) -> Float:
     return 0 * s
 
 
-def _series(rng: np.random.Generator, length: float, closed: bool, size: float) -> Function:
+def series(rng: np.random.Generator, length: float, closed: bool, size: float) -> Function:
     """A sum of up to eight waves with coefficients that decay like exp(-m/2); `size` is the root of the sum of their squares."""
     m = np.arange(0 if closed else 1, 9)
     a = rng.standard_normal(m.size) * np.exp(-m / 2)
@@ -128,7 +128,7 @@ def _straight(s: Float) -> tuple[Float, Float, Float]:
 
 def _line(rng: np.random.Generator, length: float, bend: float, stretch: float, ends: bool) -> Line:
     """A line with r' = (1 + stretch sin(pi s/l)^4) (cos phi, sin phi), where phi turns smoothly by at most `bend`."""
-    waves, domain = _series(rng, length, False, 1.0), [0.0, length]
+    waves, domain = series(rng, length, False, 1.0), [0.0, length]
 
     def curvature(s: Float) -> Float:
         return (waves(s) + 0.7) * (1.0 if ends else np.sin(np.pi * s / length) ** 4)
@@ -160,5 +160,5 @@ def _ring(rng: np.random.Generator, length: float, size: float) -> Line:
 
 def _wavy(rng: np.random.Generator, length: float, size: float) -> Line:
     """A straight line with waves of `size` times the length, across and along."""
-    along, across = _series(rng, length, True, 0.3 * size * length), _series(rng, length, True, size * length)
+    along, across = series(rng, length, True, 0.3 * size * length), series(rng, length, True, size * length)
     return lambda s: (s + along(s), across(s), 0 * s)

@@ -30,6 +30,7 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
 from compare.lump import lump
+from compare.random_loads import loaded
 from compare.random_scenes import Drawn, random_scene
 from compare.sweeps import Result, sweep
 from compare.trust_table import LEAST, Row, Trust
@@ -67,10 +68,10 @@ def at_most(seconds: float) -> Iterator[None]:
 
 
 def examine(case: list[float]) -> list[list[Any]]:
-    """The two rows of a case [seed, index, seconds]; called in other processes."""
+    """The two rows of a case (`cases_of`); called in other processes."""
     seed, index, seconds = int(case[0]), int(case[1]), float(case[2])
     _warm_up()
-    drawn = random_scene(seed, index)
+    drawn = scene_of(case)
     rng = np.random.default_rng([seed, index, 1])
     tolerances = 10 ** -rng.uniform(2, 7, 2)
     begin = Row(f"{seed}:{index}", drawn.kind, drawn.scene.rolling, drawn.words, drawn.scene.duration, "", np.nan, "")
@@ -82,6 +83,19 @@ def examine(case: list[float]) -> list[list[Any]]:
         blank = begin._replace(by=name, tol=float(f"{tol:.1e}"))
         rows.append(list(found(drawn, blank, seconds)))
     return rows
+
+
+def scene_of(case: list[float]) -> Drawn:
+    """The scene of a case."""
+    seed, index = int(case[0]), int(case[1])
+    return loaded(random_scene(seed, index), seed, index) if len(case) > 3 else random_scene(seed, index)
+
+
+def cases_of(seed: int, first: int, count: int, seconds: float, loads: bool) -> list[list[float]]:
+    """Cases [seed, index, seconds], with a fourth number for rods that vary and have loads, from an index on."""
+    start = checks.whole("first", first, 0)
+    case = [checks.whole("seed", seed, 0), checks.number("seconds", seconds, positive=True)]
+    return [[case[0], index, case[1], *[1.0] * loads] for index in range(start, start + count)]
 
 
 @cache
@@ -237,6 +251,7 @@ def trust(
     executor: Executor | None = None,
     archive: str | Path | None = None,
     progress: bool = True,
+    loads: bool = False,
 ) -> Trust:
     """Solve and run random scenes to random tolerances, 1e-2 to 1e-7, and measure the errors.
 
@@ -246,15 +261,13 @@ def trust(
     seed : seed of the scenes and tolerances.
     seconds : processor time allowed for one `solve` or `simulate`, s; two to four times that for its reference.
     executor, archive, progress : as for `compare.sweep`.
+    loads : whether parameters vary along the rod, and scenes have loads (`compare.random_loads`).
 
     Raises
     ------
     ValueError : for numbers outside their range.
     """
-    start = checks.whole("first", first, 0)
-    last = start + checks.whole("scenes", scenes, 1)
-    limit = checks.number("seconds", seconds, positive=True)
-    cases = [[checks.whole("seed", seed, 0), index, limit] for index in range(start, last)]
+    cases = cases_of(seed, first, checks.whole("scenes", scenes, 1), seconds, loads)
     return gathered(sweep(examine, cases, executor, archive, progress))
 
 

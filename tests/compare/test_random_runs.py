@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from compare import random_runs as module
@@ -11,11 +12,9 @@ from compare.trust_table import LEAST, MOST, Row
 from discs import SimulationError, simulate
 from discs.running.tolerance import NotReached
 
-SAMPLE = (0, 3)  # both laws; chosen for their time only
 
-
-def row_of(index, seconds=20.0):
-    return Row(*examine([3, index, seconds]))
+def row_of(index, *more):
+    return Row(*examine([3, index, *(more or (20.0,))]))
 
 
 @pytest.mark.slow
@@ -30,9 +29,22 @@ def test_problems_are_of_all_kinds():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("index", SAMPLE)
-def test_tolerances_are_kept(index):
-    row = row_of(index)
+def test_rods_that_vary_have_loads_too():
+    drawn = [random_problem(3, index, True) for index in range(20)]
+    kinds = [{type(load).__name__ for load in problem.loads} for problem, _, _ in drawn]
+    assert set().union(*kinds) == {"Torque", "Damping", "Slope", "Rest"}
+    assert sum(np.ptp(problem.chain.density) > 0 for problem, _, _ in drawn) > 2
+    again, _, row = random_problem(3, 7, True)
+    assert (again.chain.radius == drawn[7][0].chain.radius).all()
+    assert row == drawn[7][2]
+    assert all(type(load).__name__ in row.words for load in again.loads)
+    assert not random_problem(3, 7)[0].loads
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [(0,), (3,), (0, 20.0, 1.0)])  # both laws, and loads; chosen for their time only
+def test_tolerances_are_kept(case):
+    row = row_of(*case)
     assert row.outcome == "within", row
     assert row.reference_error <= row.tol / LEAST
     assert not row.counts or 1 <= row.ratio <= MOST, row
