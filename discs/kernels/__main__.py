@@ -11,6 +11,7 @@ from typing import Any
 from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import ROLLING
 from discs.integrators import METHODS, FixedStep, Integrator
+from discs.kernels.slaved_lanes import MANY
 from discs.problem import Problem, State
 from discs.simulation import simulate
 
@@ -36,15 +37,23 @@ TESTED = {"own": ("midpoint", "gauss6", "DOP853")}  # by the short suite; of oth
 
 
 def compile_for(law: str, tested: bool) -> None:
-    """Compile every kernel for one kind of chain, or those that are tested: slaved headings with a law, or "own" headings."""
+    """Compile every kernel for one kind of chain, or those that are tested: slaved headings with a law, or "own" headings.
+
+    Many discs have kernels of their own, those in lanes.
+    """
     steered = law == "own"
-    values: dict[str, Any] = {"n": 9} | dict.fromkeys(ONES + STEERED if steered else ONES, 1.0)
-    chain: Chain | SteeredChain = SteeredChain(**values) if steered else Chain(**values, rolling=law)
     words = "discs with own headings" if steered else f"discs with slaved headings, {law} law"
-    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if steered else None), 0.01)  # at rest
-    for methods in sharing(law, tested):
-        simulate(problem, methods[0], 0.005, frames=1, progress=False)
-        print(f"{words}: {', '.join(method.name for method in methods)} compiled", flush=True)
+    values: dict[str, Any] = dict.fromkeys(ONES + STEERED if steered else ONES, 1.0)
+    for n in (9, MANY):
+        chain: Chain | SteeredChain = SteeredChain(n=n, **values) if steered else Chain(n=n, **values, rolling=law)
+        problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if steered else None), 0.01)  # at rest
+        for methods in sharing(law, tested):
+            first = methods[0]
+            if n == MANY and not (isinstance(first, FixedStep) and first.in_lanes and problem.system.lanes):
+                continue
+            simulate(problem, first, 0.005, frames=1, progress=False)
+            in_lanes = ", in lanes" if n == MANY else ""
+            print(f"{words}{in_lanes}: {', '.join(method.name for method in methods)} compiled", flush=True)
 
 
 if __name__ == "__main__":

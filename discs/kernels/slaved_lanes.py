@@ -198,7 +198,7 @@ def moved(chain, base, move, d):
 
 @fill(do.spend, Laned)
 def _spend(chain, state, t, weight, move, v, scale):
-    do.spend(chain.load, state, t, weight, move, v, scale)
+    pass  # there are no loads
 
 
 @fill(do.vanishing, Laned)

@@ -59,6 +59,11 @@ def _refine(chain, work, method, room, before, h, sweep):
     return renewed(chain, work, own, h, p, force, v)
 
 
+@fill(do.finish, Laned)
+def _finish(chain, work, method, room, before, h):
+    pass  # there are no loads
+
+
 @part
 def changed(chain, rule, own, rest, force):
     """force = the change of the momenta of the stages."""
