@@ -1,5 +1,7 @@
 """One chain in lanes: vectors, the linear system against NumPy, runs of 64 discs or more against the plain engine."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,9 +10,11 @@ from continuum import untwisting_rod
 from discs import Midpoint, SimulationError, simulate
 from discs.integrators import METHODS
 from discs.kernels import lanes, vectors
+from discs.kernels import protocol as do
 from discs.kernels.compiled import jit
 from discs.kernels.slaved_lanes import MANY, Laned
 from discs.kernels.vectors import LANES, after, before, larger, largest, load, store, zero
+from discs.skew import Phase
 from tests.conftest import SLAVED, Model, models, uneven
 from tests.discs.test_kernels import CLOSE, dense_banded
 from tests.discs.test_simulate import collapsing
@@ -137,6 +141,30 @@ def test_compiled_collocation_in_lanes():
         a, b = (simulate(problem, "gauss6", 0.025, [0.05], (), False, engine) for engine in ("compiled", "plain"))
         assert max(apart(a, b)) < CLOSE
         assert a.energy[-1] == pytest.approx(problem.energy(), rel=1e-12)
+
+
+def test_a_run_of_one_step_is_judged_in_the_order_of_discs(kernels_as_python, monkeypatch):
+    """By the change of the force, as disc by disc."""
+    problem = replace(uneven(65, Model("ring", "field")), duration=3e-4)
+    one = simulate(problem, dt=3e-4, frames=1, progress=False)
+    monkeypatch.setitem(vars(problem.system), "lanes", None)
+    other = simulate(problem, dt=3e-4, frames=1, progress=False)
+    assert one.stats["step_error"] == pytest.approx(other.stats["step_error"], rel=1e-6)
+    assert one.stats["step_error"] > 1e-6
+
+
+def test_what_belongs_to_no_disc_is_at_rest():
+    problem = uneven(65, Model("ring", "field"))
+    chain, z = problem.system.lanes, problem.start()
+    own, work = do.enter(chain, Phase(z.hi, z.lo, z.pi[None])), do.workspace(chain)
+    c, still, g = np.zeros_like(own.hi), np.zeros_like(own.hi), np.zeros_like(own.pi)
+    do.settle(chain, work, own.hi, own.lo)
+    do.basis(chain, work, still, c)
+    do.pullback(chain, work, own, 0.0, still, c, own.pi, g)
+    of_discs = np.zeros(g.size, bool)
+    of_discs[chain.order.places] = True
+    assert not g[0, ~of_discs].any()
+    assert g[0, of_discs].all()
 
 
 @pytest.mark.parametrize("n", [4097, 16385])
