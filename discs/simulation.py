@@ -240,12 +240,12 @@ def _run(
         if record.complete:
             return record.solution({})
         album: Album | None = None
-        alone = checkpoint is None and not want and system.load is None
-        if alone and not because and isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None:
+        stepwise = isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
+        if (stepwise or integrator.runs_whole) and checkpoint is None and not because and not want and system.load is None:
             album = Album(system, times, h)
         march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want, album)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
-        if album is not None:
+        if album is not None and (stepwise or _uncut(march.whole, record, 0, march)):
             _fill(album, march, shown, record)
             record.rows, first = album.rows, times.size
         for f in range(first, times.size):

@@ -26,7 +26,8 @@ class Integrator(ABC):
     offers : names of further quantities at frames, see `extras`.
     takes_loads : whether it takes all loads, or only those that are part of the energy.
     takes_motors, damps : whether it takes discs whose rate is given, and whether it damps oscillations that steps do not resolve.
-    adaptive : whether it chooses its own steps; below, h is then the longest step. back : longest substep back in time, over h.
+    adaptive : whether it chooses its own steps; below, h is then the longest step. runs_whole : whether it has `whole`.
+    back : longest substep back in time, over h.
     """
 
     name: ClassVar[str]
@@ -40,6 +41,7 @@ class Integrator(ABC):
     back: ClassVar[float] = 0.0
     damps: ClassVar[bool] = False
     adaptive: ClassVar[bool]
+    runs_whole: ClassVar[bool] = False
 
     @final
     @cached_property
@@ -80,6 +82,13 @@ class Integrator(ABC):
     @abstractmethod
     def recall(self, memory: Memory, kept: dict[str, Any]) -> Memory:
         """The memory from what `keep` returned; `memory` is that of `begin` for the same run."""
+
+    def whole(self, system: RollingDiscs, chain: Parameters, z: Phase, h: float, bound: float, album: Any) -> Work | None:
+        """All frames of an `album` (`discs.running.album.Album`) from the state z at once, by steps of at most h; without loads.
+
+        None if it cannot, or if the run fails; it then goes step by step.
+        """
+        return None
 
     def finer(self, system: RollingDiscs, memory: Memory, t: float, h: float, chain: Parameters = None) -> Float | None:
         """Positions (rows, n) one step h later with an error several times smaller, for `discs.running.step_error`.

@@ -1,5 +1,6 @@
 """SciPy's integrators on the reduced equations: for comparisons, and for step control by local tolerances."""
 
+import signal
 from abc import ABC
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -12,7 +13,7 @@ from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
 from discs.integrators.base import Integrator
-from discs.integrators.work import Frame, Work
+from discs.integrators.work import Cut, Frame, Work
 from discs.kernels.shared import columns
 from discs.skew import Parameters, Phase
 
@@ -195,6 +196,20 @@ class DOP853(SolveIvp):
 
     name: ClassVar[str] = "DOP853"
     order: ClassVar[int] = 8
+    runs_whole: ClassVar[bool] = True
+
+    def whole(self, system: RollingDiscs, chain: Parameters, z: Phase, h: float, bound: float, album: Any) -> Work | None:
+        """See `discs.kernels.dop853`."""
+        from discs.kernels import dop853
+
+        state = Phase(z.hi, z.lo, np.array(z.pi, ndmin=2))
+        done, evaluations = dop853.run(
+            dop853.coefficients(), chain, state, self.rtol, self.atol, h, bound, album.times, album.q, album.rates, album.told
+        )
+        if done < 0:
+            signal.raise_signal(signal.SIGINT)
+            raise Cut
+        return Work(gradients=evaluations) if done == album.times.size else None
 
 
 class Radau(SolveIvp):

@@ -22,12 +22,13 @@ STEERED = ("heading_inertia", "stretch_stiffness", "shear_stiffness")
 def sharing(law: str, tested: bool = False) -> list[list[Integrator]]:
     """All methods with a compiled form, or those whose kernels for chains of this law are tested.
 
-    They are grouped by the kernels that they share: those with parameters of one type, and the adaptive ones.
+    They are grouped by the kernels that they share: those with parameters of one type, and the adaptive ones that go step by step.
     """
     found: dict[type, list[Integrator]] = {}
     for method in (cls() for cls in METHODS.values()):
         if method.compiles:
-            found.setdefault(type(method.parameters) if isinstance(method, FixedStep) else Integrator, []).append(method)
+            adaptive = type(method) if method.runs_whole else Integrator
+            found.setdefault(type(method.parameters) if isinstance(method, FixedStep) else adaptive, []).append(method)
     some = TESTED.get(law, METHODS) if tested else METHODS
     return [methods for methods in found.values() if any(method.name in some for method in methods)]
 
@@ -52,6 +53,7 @@ def compile_for(law: str, tested: bool) -> None:
             if n == MANY and not (isinstance(first, FixedStep) and first.in_lanes and problem.system.lanes):
                 continue
             simulate(problem, first, 0.005, frames=1, progress=False)
+            simulate(problem, first, 0.005, frames=1, want="velocity", progress=False)  # frames asked for have kernels of their own
             in_lanes = ", in lanes" if n == MANY else ""
             print(f"{words}{in_lanes}: {', '.join(method.name for method in methods)} compiled", flush=True)
 

@@ -242,6 +242,12 @@ def compiling(say: Callable[[], None], after: float) -> Iterator[None]:
         notice.cancel()
 
 
+def say_so(name: str) -> None:
+    """Print that the kernels of a method are being compiled."""
+    once = "" if uncached else ", once on this machine"
+    print(f"compiling {name!r}{once}: some tens of seconds ...", file=sys.stderr, flush=True)
+
+
 def interrupted() -> bool:
     """Whether Ctrl-C was pressed since the call began; a kernel then returns at once, with -1 steps.
 

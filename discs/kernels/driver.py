@@ -7,9 +7,9 @@ the functions that steps call, in this folder.
 import numpy as np
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import fill, interrupted, kernel, part
+from discs.kernels.compiled import interrupted, kernel, part
 from discs.kernels.limits import TURNED
-from discs.kernels.shared import ahead, columns, disc_by_disc, forward
+from discs.kernels.shared import ahead, columns, disc_by_disc, forward, seen
 from discs.skew import Phase
 
 POLLED = 16  # steps between two polls of Ctrl-C; sweeps poll it themselves
@@ -158,29 +158,6 @@ def judge(chain, start, end, place, defect):
         defect[0, row], defect[1, row] = off / 12, size
         worst = np.inf if row == 3 and turned > TURNED else max(worst, defect[0, row] / (size if size > 0 else 1.0))
     return worst
-
-
-@part
-def seen(chain, work, c, hi, lo, v, q):
-    """q = hi + lo, the base position; returns the energy and the largest slip |r. - e omega| at rates v."""
-    energy, slip = do.potential(chain, work), 0.0
-    for row in range(hi.shape[0]):
-        for i in range(hi.shape[1]):
-            q[row, i] = hi[row, i] + lo[row, i]
-            energy += 0.5 * chain.weights[row, i] * v[row, i] * v[row, i]
-    for i in range(hi.shape[1]):
-        x, y = v[0, i] - c[0, i] / c[2, i] * v[2, i], v[1, i] - c[1, i] / c[2, i] * v[2, i]
-        slip = max(slip, np.sqrt(x * x + y * y))
-    return energy, slip
-
-
-@fill(do.frame, object)
-def _frame(chain, work, state, c, v, q, rates):
-    do.rate(state, chain, work, c, 1.0, v)
-    for row in range(rates.shape[0]):
-        for i in range(rates.shape[1]):
-            rates[row, i] = v[row + 2, i]
-    return seen(chain, work, c, state.hi, state.lo, v, q)
 
 
 @kernel

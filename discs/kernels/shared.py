@@ -190,6 +190,29 @@ def _leave(chain, own, state):
     do.take(own, state)
 
 
+@part
+def seen(chain, work, c, hi, lo, v, q):
+    """q = hi + lo, the base position; returns the energy and the largest slip |r. - e omega| at rates v."""
+    energy, slip = do.potential(chain, work), 0.0
+    for row in range(hi.shape[0]):
+        for i in range(hi.shape[1]):
+            q[row, i] = hi[row, i] + lo[row, i]
+            energy += 0.5 * chain.weights[row, i] * v[row, i] * v[row, i]
+    for i in range(hi.shape[1]):
+        x, y = v[0, i] - c[0, i] / c[2, i] * v[2, i], v[1, i] - c[1, i] / c[2, i] * v[2, i]
+        slip = max(slip, np.sqrt(x * x + y * y))
+    return energy, slip
+
+
+@fill(do.frame, object)
+def _frame(chain, work, state, c, v, q, rates):
+    do.rate(state, chain, work, c, 1.0, v)
+    for row in range(rates.shape[0]):
+        for i in range(rates.shape[1]):
+            rates[row, i] = v[row + 2, i]
+    return seen(chain, work, c, state.hi, state.lo, v, q)
+
+
 @fill(do.bases, object)
 def _bases(chain, work, moves, c):
     for i in range(moves.shape[0]):

@@ -18,12 +18,13 @@ class Album:
 
     Attributes
     ----------
-    steps, rests : (F,), the whole steps before each frame, and the time from there. done : number of frames recorded.
+    times : (F,). steps, rests : (F,), the whole steps before each frame, and the time from there. done : number of frames recorded.
     q, rates : (rows, F, n), (rows - 2, F, n), positions, and rates of the rows from theta on.
     told : (2, F), energy and largest slip.
     """
 
     def __init__(self, system: RollingDiscs, times: Float, h: float) -> None:
+        self.times = times
         self.names = *system.rows, *system.rates[2:], "energy", "rolling_residual"
         self.steps = (times / h * (1 + 4e-16) + 1e-9).astype(np.int64)  # as `steps_before`
         rests = times - self.steps * h

@@ -31,8 +31,7 @@ class March:
     Parameters
     ----------
     problem, integrator, h : the problem, the method and its step.
-    compiled : use the compiled form of the chain.
-    quiet : print no notice that kernels are being compiled.
+    compiled : use the compiled form of the chain. quiet : print no notice that kernels are being compiled.
     watch : the estimate of the error of the steps; None for none.
     by_load : book what loads do one by one, too; for the plain form.
     album : the frames that compiled steps record; None if each frame is asked for.
@@ -76,9 +75,14 @@ class March:
             warn_of_lost_digits(self.system, h)
         if integrator.back:
             warn_of_growth(problem, integrator.name, integrator.back, h)
-        self.memory: Memory = integrator.begin(self.system, problem.start(), h, self.work, self.parameters)
+        self.memory: Memory = None
+        if album is None or not integrator.runs_whole:  # otherwise only if that fails
+            self._begin()
         if self.parameters is not None:
             self._prepare(quiet)
+
+    def _begin(self) -> None:
+        self.memory = self.integrator.begin(self.system, self.problem.start(), self.h, self.work, self.parameters)
 
     def _prepare(self, quiet: bool) -> None:
         """Compile the kernels (once per machine) or read them from disc (once per process)."""
@@ -87,19 +91,27 @@ class March:
         key = (asked, type(self.integrator), type(chain), *map(type, chain or ()))  # the types of the chain's laws and load too
         if key in _PREPARED:
             return
-        from discs.kernels.compiled import compiling, uncached
+        from discs.kernels.compiled import compiling, say_so
 
-        def say() -> None:
-            once = "" if uncached else ", once on this machine"
-            if not quiet:
-                print(f"compiling {self.integrator.name!r}{once}: some tens of seconds ...", file=sys.stderr, flush=True)
-
-        with compiling(say, NOTICE):
+        with compiling(lambda: None if quiet else say_so(self.integrator.name), NOTICE):
             if self.twin is not None:
                 self.twin.march(self.system, self.parameters, self.memory, 0.0, self.h, 0, self.bound)
+            elif self.album is not None:
+                nothing = Album(self.system, self.album.times[:0], self.h)
+                self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.bound, nothing)
             if asked:
                 self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
         _PREPARED.add(key)
+
+    def whole(self) -> bool:
+        """Take the whole run at once; False if the method cannot or the run fails, which then goes step by step."""
+        assert self.album is not None
+        work = self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.bound, self.album)
+        if work is None:
+            self._begin()
+            return False
+        self.work, self.step, self.album.done = work, int(self.album.steps[-1]), self.album.steps.size
+        return True
 
     def keep(self) -> dict[str, Any]:
         """All that a restart needs, as arrays and numbers by name."""
@@ -186,7 +198,7 @@ class March:
         try:
             frame = self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, self.work, self.parameters)
         except ArithmeticError as error:
-            raise self._gave_up(error) from None
+            raise SimulationError(f"the run failed: {error}", self.step, self.step * self.h, 0) from None
         if tau:
             if self.work.unconverged > stuck:
                 self._remember(self.memory, 1, stuck)
@@ -235,7 +247,7 @@ class March:
         try:
             self.memory = self.integrator.advance(self.system, previous, self.step * self.h, self.h, self.work)
         except ArithmeticError as error:
-            raise self._gave_up(error) from None
+            raise SimulationError(f"the run failed: {error}", self.step, self.step * self.h, 0) from None
         # not leapfrog, whose memory is no `Phase`: its moves are its velocities
         by_velocity = self.work.unconverged > stuck or (self.explicit and isinstance(previous, Phase))
         self._check(self._lost(previous, self.memory, self.h, by_velocity), self.step + 1, previous)
@@ -254,9 +266,6 @@ class March:
             start = self.integrator.at(self.system, before, self.step * self.h, 0.0, self.h, self.work)
             lost = self.system.lost_heading(before, start._replace(hi=start.hi + h * start.rate))
         return lost
-
-    def _gave_up(self, error: ArithmeticError) -> SimulationError:
-        return SimulationError(f"the run failed: {error}", self.step, self.step * self.h, 0)
 
     def _accept(self, twin: FixedStep, previous: Memory, tally: Tally) -> int:
         """Count and check compiled steps from the memory `previous`; returns how many they are."""
