@@ -64,7 +64,7 @@ def overview(
         (ends, of_links), *others = kinds
         beside = [executor.submit(study, ends=ends, degree=of_links, progress=False)] if executor and others else []
         here = [study(ends=ends, degree=of_links, progress=progress) for ends, of_links in kinds[len(beside) :]]
-        studies = [_awaited(future, "discs, plain ends", progress) for future in beside] + here
+        studies = [_awaited(future, f"discs, {'own' if scene.steered else 'springs'}", progress) for future in beside] + here
         write_csv(folder / "convergence.csv", studies)
         studies[0].plot(folder / "convergence.png", *studies[1:])
         figures.save(limit_figures.limits_of_all(studies)[0], folder / "limits-of-all.png")

@@ -57,14 +57,14 @@ def convergence(
     fields = compared(scene)
     more = Limit(scene, field, want)
     error = np.empty((len(problems), len(fields) + len(more.names)))
-    bar = tqdm(problems, desc=f"discs, {problems[0].chain.ends} ends", unit="chain", delay=1, disable=not progress)
+    kind = "elements" if degree == 2 else "own" if scene.steered and not scene.closed else problems[0].chain.ends
+    bar = tqdm(problems, desc=f"discs, {kind}", unit="chain", delay=1, disable=not progress)
     for i, problem in enumerate(bar):
         first = progress and i == 0  # which may report that kernels are compiled
         run = simulate(problem, method, h, frames=1, want=more.of_discs, progress=first)
         error[i] = *apart(scene, run, field), *more.errors(run)
     floor = max(field.error_estimate[name] for name in fields)
     k = np.array([problem.chain.k for problem in problems])
-    kind = "elements" if degree == 2 else "own" if scene.steered and not scene.closed else problems[0].chain.ends
     return Study(scene, kind, sizes, k, error, floor, h, more.names, more.floors)
 
 
