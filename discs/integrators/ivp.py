@@ -192,7 +192,7 @@ class RK45(SolveIvp):
 
 
 class DOP853(SolveIvp):
-    """Dormand and Prince's method of order 8; explicit."""
+    """Dormand and Prince's method of order 8; explicit. Compiled runs without loads are taken whole, by `discs.kernels.dop853`."""
 
     name: ClassVar[str] = "DOP853"
     order: ClassVar[int] = 8
