@@ -10,7 +10,7 @@ import pytest
 from continuum import solve, untwisting_rod
 from discs import Chain, Problem, State, SteeredChain
 from discs.integrators import METHODS
-from discs.kernels import driver
+from discs.kernels import dop853, driver
 from discs.kernels.__main__ import sharing
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job: tests send Ctrl-C, to themselves and to children
@@ -112,6 +112,7 @@ def kernels_as_python(monkeypatch):
     """Kernels run as plain Python, to the arithmetic's last bits but one: what no user has compiled ahead takes 20 s to compile."""
     for name in ("march", "look", "observe", "reduced"):
         monkeypatch.setattr(driver, name, getattr(driver, name).__wrapped__)
+    monkeypatch.setattr(dop853, "run", dop853.run.__wrapped__)
 
 
 @pytest.fixture(scope="session")
