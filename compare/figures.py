@@ -68,7 +68,7 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
     scene = studies[0].scene
     ax.set_xlabel("number of discs N")
     ax.set_ylabel("largest error over the discs (length, rad)")
-    ax.set_title(f"N discs against the field: {scene.name}, {scene.rolling} law, t = {scene.duration:g}")
+    ax.set_title(f"N discs against the field: {scene.name}, {scene.law}, t = {scene.duration:g}")
     ax.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     ax.grid(alpha=0.3, which="major")
     return ax
@@ -158,7 +158,7 @@ def motion(run: Solution, scene: Scene, arrows: int = 24, instants: int = 5) -> 
         ax.set_title(f"t = {run.t[f]:.3g}", y=0.98)
     top: Any = figure.add_subplot(rows, columns, len(lines) + 1)
     of_discs.motion(run, top, instants=len(lines))
-    figure.suptitle(f"{scene.name}, {scene.rolling} law; arrows are the directors d₃")
+    figure.suptitle(f"{scene.name}, {scene.law}; arrows are the directors d₃")
     return figure
 
 

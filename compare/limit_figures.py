@@ -31,7 +31,7 @@ def limits_of_all(studies: Sequence[Study]) -> list[Axes]:
         ax.set_title(KIND[study.ends])
     axes[0].set_ylabel("error; of energy and force relative to the field's largest value")
     scene = studies[0].scene
-    figure.suptitle(f"Not only the positions converge: {scene.name}, {scene.rolling} law, t = {scene.duration:g}")
+    figure.suptitle(f"Not only the positions converge: {scene.name}, {scene.law}, t = {scene.duration:g}")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=9)
     return axes
 

@@ -72,7 +72,7 @@ def overview(
         ax = figures.energy(
             _awaited(energies, "energy over a long time", progress) if energies else energy_runs(long, progress=progress)
         )
-        ax.set_title(f"{scene.name}, {scene.rolling} law, energy over [0, {long.duration:g}]")
+        ax.set_title(f"{scene.name}, {scene.law}, energy over [0, {long.duration:g}]")
         figures.save(ax, folder / "energy.png")
     return studies
 
@@ -107,7 +107,7 @@ def summary(studies: list[Study]) -> str:
     scene, floor = studies[0].scene, max(s.floor for s in studies)
     table = format_table([studies[0].columns, *(row for study in studies for row in study.rows())])
     return (
-        f"{scene.name}, {scene.rolling} law, t = {scene.duration:g}: largest error over the discs "
+        f"{scene.name}, {scene.law}, t = {scene.duration:g}: largest error over the discs "
         f"against the field (estimated error {floor:.1e})\n{table}\n\n"
         "Velocity and slope; then energy and ground's force, relative to the field's largest value (inside: an eighth of the\n"
         "length or more away from free ends)\n" + "\n\n".join(study.wants_table() for study in studies)

@@ -101,7 +101,7 @@ def fluxes(scene: Scene, n: int = 513, frames: int = 451) -> Figure:
         figure.colorbar(image, ax=ax, extend=beyond).set_label(name)
         ax.set_xlabel(LABEL["s"])
     left.set_ylabel(LABEL["t"])
-    figure.suptitle(f"{scene.name}, {scene.rolling} law", fontsize=10)
+    figure.suptitle(f"{scene.name}, {scene.law}", fontsize=10)
     return figure
 
 

@@ -230,6 +230,11 @@ class Scene:
         return ("x", "y", "theta", "omega", "phi", "phi_rate")[: 6 if self.steered else 4]
 
     @property
+    def law(self) -> str:
+        """How the rod rolls, for titles: the law, or that headings are its own."""
+        return "own headings" if self.steered else f"{self.rolling} law"
+
+    @property
     def steered(self) -> bool:
         """Whether sections have headings of their own."""
         return isinstance(self.rod, SteeredRod)

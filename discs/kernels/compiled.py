@@ -215,7 +215,7 @@ def _warn_of_no_cache() -> None:
         uncached.append(True)
         warn(
             "compiled kernels cannot be kept, as neither the package's folder nor the user's cache can be written: every process "
-            "compiles them again, which takes some tens of seconds; set NUMBA_CACHE_DIR to a folder that can be written"
+            "compiles them again, which takes a minute or more; set NUMBA_CACHE_DIR to a folder that can be written"
         )
 
 
@@ -245,7 +245,7 @@ def compiling(say: Callable[[], None], after: float) -> Iterator[None]:
 def say_so(name: str) -> None:
     """Print that the kernels of a method are being compiled."""
     once = "" if uncached else ", once on this machine"
-    print(f"compiling {name!r}{once}: some tens of seconds ...", file=sys.stderr, flush=True)
+    print(f"compiling {name!r}{once}: a minute or so ...", file=sys.stderr, flush=True)
 
 
 def interrupted() -> bool:
