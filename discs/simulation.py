@@ -240,8 +240,9 @@ def _run(
         if record.complete:
             return record.solution({})
         album: Album | None = None
-        stepwise = isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
-        if (stepwise or integrator.runs_whole) and checkpoint is None and not because and not want and system.load is None:
+        stepwise = not because and isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
+        whole = not because and integrator.runs_whole
+        if (stepwise or whole) and checkpoint is None and not want and system.load is None:
             album = Album(system, times, h)
         march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want, album)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))

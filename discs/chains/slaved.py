@@ -145,9 +145,9 @@ class SlavedSystem(RollingDiscs):
 
     @cached_property
     def lanes(self) -> Parameters:
-        """The same parameters in lanes (`discs.kernels.slaved_lanes`), for methods that take them; None for few discs."""
+        """The same parameters in lanes (`discs.kernels.slaved_lanes`), for methods that take them; None for few discs, or very many."""
         if self.load is not None or not isinstance(self._springs, LinearCurvature):
             return None
         from discs.kernels import slaved_lanes, slaved_stages  # noqa: F401, and the sweeps
 
-        return slaved_lanes.arranged(self.parameters) if self.n >= slaved_lanes.MANY else None
+        return slaved_lanes.arranged(self.parameters) if slaved_lanes.MANY <= self.n <= slaved_lanes.MOST else None

@@ -21,6 +21,7 @@ from discs.kernels.vectors import LANES, after, before, load, store
 from discs.skew import Phase
 
 MANY = 64  # discs from which lanes are used; they need rows of two discs behind `Order.first`
+MOST = 100_000  # discs up to which they are: they take half as much memory again, 0.3 GiB for a million discs
 
 
 class Laned(NamedTuple):
