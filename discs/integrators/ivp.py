@@ -192,7 +192,8 @@ class RK45(SolveIvp):
 
 
 class DOP853(SolveIvp):
-    """Dormand and Prince's method of order 8; explicit. Compiled runs without loads are taken whole, by `discs.kernels.dop853`."""
+    """Dormand and Prince's method of order 8; explicit. Compiled runs without loads, `want` and checkpoint are taken whole, by
+    `discs.kernels.dop853`; others go step by step, by SciPy, and differ in the last digits."""
 
     name: ClassVar[str] = "DOP853"
     order: ClassVar[int] = 8

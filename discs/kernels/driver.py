@@ -98,7 +98,8 @@ def march(
             for j in range(spent.size):
                 spent[j] = kept[j]
             do.settle(chain, work, before.hi, before.lo)
-            lost = do.lost(chain, work, slope)
+            do.lost(chain, work, slope)
+            lost = -1  # of the steps: a frame whose step loses a heading is left to `simulate`
             if unfit:
                 break
             continue

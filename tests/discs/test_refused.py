@@ -10,6 +10,8 @@ from discs import Chain, Midpoint, Problem, State, SteeredChain, Suzuki4, simula
 from tests.conftest import Model, uneven
 from tests.discs.test_simulate import PARAMETERS, STEERED
 
+WANTED = "'velocity', 'slope', 'contact_force', 'work_by_load'"
+
 
 @pytest.mark.parametrize(
     ("change", "message"),
@@ -52,8 +54,11 @@ def test_bad_chains_are_refused(change, message):
         ({"dt": 0.1, "tol": 1e-3}, "give dt or tol, not both"),
         ({"tol": -1.0}, "tol must be a positive finite number"),
         ({"method": "RK45", "tol": 1e-3}, r"RK45 has tolerances of its own: RK45\(rtol=..., atol=...\)"),
-        ({"want": ("colour",)}, "want must be one of 'velocity', 'slope', 'contact_force'; got 'colour'"),
-        ({"want": "modified_energy"}, "want must be one of 'velocity', 'slope', 'contact_force'; got 'modified_energy'"),
+        ({"want": ("colour",)}, f"want must be one of {WANTED}; got 'colour'"),
+        (
+            {"want": "modified_energy"},
+            f"want must be one of {WANTED}; got 'modified_energy'",
+        ),
     ],
 )
 def test_bad_runs_are_refused(arguments, message):
