@@ -1,4 +1,4 @@
-"""Frames that compiled steps record as they go, which costs a tenth of a frame by itself."""
+"""Frames that compiled steps record themselves. This takes a tenth of the time of asking for each frame from Python."""
 
 from typing import Any
 
