@@ -1,14 +1,13 @@
 """`sweep(function, cases)`: one function for many cases, on all cores or a cluster, with an archive of results."""
 
 import json
-import os
 import pickle
 import threading
 import time as clock
 import traceback
 from collections.abc import Callable, Iterable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
-from contextlib import nullcontext, suppress
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import nullcontext
 from functools import cached_property, lru_cache
 from multiprocessing import parent_process
 from pathlib import Path
@@ -19,7 +18,8 @@ from tqdm import tqdm
 
 from compare.background import NotStarted, background
 from compare.fingerprint import fingerprint
-from compare.sweep_archive import Archive, Result, key_of, read, record
+from discs.files.results import Archive, Result, key_of, read, record
+from discs.running.calls import call_each, cores
 
 __all__ = ["Result", "cores", "read", "sweep"]
 
@@ -69,7 +69,8 @@ def sweep(
         rest = {key: case for key, case in zip(keys, cases, strict=True) if key not in done}
         with tqdm(total=len(cases), initial=len(done), desc="sweep", unit="case", disable=not progress) as bar:
 
-            def took(key: str, line: str) -> None:
+            def took(key: str, future: Future[str]) -> None:
+                line = _line(future, rest[key])
                 kept.write(line)
                 done[key] = Result(**json.loads(line))
                 del rest[key]
@@ -79,7 +80,8 @@ def sweep(
             for given in (executor, None) if executor else (None,):
                 if rest:
                     with nullcontext(given) if given else background(min(cores(), len(rest))) as workers:
-                        _call(workers, _Sent(function), rest, took)
+                        sent = _Sent(function)
+                        call_each(workers, _attempt, {key: (sent, case) for key, case in rest.items()}, took)
     return [done[key]._replace(case=case) for key, case in zip(keys, cases, strict=True)]
 
 
@@ -94,22 +96,6 @@ def _identity(function: Callable[[Any], Any], archive: str | Path | None) -> tup
         raise ValueError(
             f"an archive must identify its function, and cannot identify {name}: {error}; put that into the cases"
         ) from None
-
-
-def _call(workers: Executor, function: "_Sent", cases: dict[str, Any], took: Callable[[str, str], None]) -> None:
-    """Call a function for cases by key; `took` gets the line of each that ends. Cases that a broken executor loses are left out."""
-    futures: dict[Future[str], str] = {}
-    try:
-        with suppress(BrokenExecutor):
-            for key, case in cases.items():
-                futures[workers.submit(_attempt, function, case)] = key
-        for future in as_completed(futures):
-            with suppress(BrokenExecutor):
-                took(futures[future], _line(future, cases[futures[future]]))
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
 
 
 class _Sent:
@@ -139,11 +125,6 @@ class _Sent:
 def _received(content: bytes) -> Callable[[Any], Any]:
     function: Callable[[Any], Any] = pickle.loads(content)
     return function
-
-
-def cores() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _attempt(function: Callable[[Any], Any], case: Any) -> str:

@@ -20,6 +20,7 @@ from discs.mechanics import MechanicalSystem
 from discs.mechanics.friction import first_slip, friction_needed
 from discs.mechanics.lagrange import lagrange_dalembert
 from discs.problem import Problem, State
+from discs.running.ensemble import simulate_many
 from discs.running.failure import SimulationError
 from discs.running.suggest import suggest_dt
 from discs.simulation import simulate
@@ -50,5 +51,6 @@ __all__ = [
     "lagrange_dalembert",
     "load",
     "simulate",
+    "simulate_many",
     "suggest_dt",
 ]

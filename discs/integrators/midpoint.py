@@ -11,7 +11,8 @@ from discs.arrays import Float
 from discs.integrators.base import OneStep
 from discs.integrators.work import Work
 from discs.kernels import protocol as do
-from discs.kernels.compiled import CUT, Cost, fill, interrupted
+from discs.kernels.compiled import CUT, Cost, fill
+from discs.kernels.interrupts import interrupted
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import copy, renew, stuck, unsettled
 from discs.skew import Phase, SkewGradient, add
@@ -142,7 +143,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
         renew(work.c, p, 0.5 * tau, move, chain.scale, room.change)
         sweep, change = 0, np.inf
         while unsettled(method, sweep, change):
-            if interrupted():
+            if interrupted(move.size):
                 return CUT
             change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
             sweep += 1

@@ -12,7 +12,8 @@ from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import OneStep
 from discs.integrators.work import Work
 from discs.kernels import protocol as do
-from discs.kernels.compiled import CUT, Cost, fill, interrupted
+from discs.kernels.compiled import CUT, Cost, fill
+from discs.kernels.interrupts import interrupted
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import back, forward, largest, stuck, unsettled
 from discs.skew import Phase, add
@@ -144,7 +145,7 @@ def _step(method: Swept, chain: Any, work: Any, room: Room, before: Phase, after
     do.push(chain.load, before, t + 0.5 * h, half, c, before.pi, h, pull)
     sweep, moved = 0, np.inf
     while unsettled(method, sweep, moved):
-        if interrupted():
+        if interrupted(before.hi.size):
             return CUT
         sweep += 1
         do.basis(chain, work, move, end)

@@ -32,12 +32,13 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # Parts of a kernel count no references, as the kernel holds their arguments and they make no arrays. Python cannot call them.
 PART: dict[str, Any] = OPTIONS | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 HERE = Path(__file__).parent
-CALLED = HERE / "compiled.py", HERE / "limits.py"  # files that every kernel depends on
+CALLED = HERE / "compiled.py", HERE / "interrupts.py", HERE / "limits.py"  # files that every kernel depends on
 ROOM = 2**20  # bytes on disc that a kernel may need
 UNUSED = 86_400.0  # seconds without use after which kernels of earlier content are removed
 CUT = -1, 0, 0  # the cost of a step that Ctrl-C interrupted
 Cost = tuple[int, int, int]  # of a step: gradients, solves, unconverged iterations
 
+_ONE = threading.RLock()  # one thread at a time sets where numba keeps a kernel
 _WAITING: list[Callable[[], object]] = []  # registrations to be made with numba
 _MODULES: dict[str, dict[str, Any]] = {}  # modules with parts, forms or kernels, and their contents
 _FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
@@ -111,13 +112,14 @@ def jit(function: Callable[..., Any]) -> Callable[..., Any]:
     import numba
 
     tell_numba()
-    return numba.njit(**OPTIONS)(function)
+    return numba.njit(nogil=True, **OPTIONS)(function)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator: a function called from Python, compiled at its first call for each combination of parameters.
 
-    The types of its arguments that are NamedTuples (a chain, a method), and of their entries (laws, load), select the forms.
+    Other threads run meanwhile. The types of its arguments that are NamedTuples (a chain, a method), and of their entries (laws,
+    load), select the forms.
     """
 
     known: dict[tuple[type, ...], Callable[..., Any]] = {}
@@ -129,7 +131,9 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
             if isinstance(argument, tuple):
                 kinds += tuple(map(type, argument))
         if kinds not in known:
-            known[kinds] = compiled(function, *(kind for kind in kinds if kind in _FORMS))
+            with _ONE:
+                if kinds not in known:
+                    known[kinds] = compiled(function, *(kind for kind in kinds if kind in _FORMS))
         return known[kinds](*arguments)
 
     return call
@@ -149,7 +153,7 @@ def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
         return jit(function)
     own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, kept
     try:
-        return numba.njit(cache=True, **OPTIONS)(function)
+        return numba.njit(cache=True, nogil=True, **OPTIONS)(function)
     finally:
         numba.config.CACHE_DIR = own
 
@@ -246,26 +250,3 @@ def say_so(name: str) -> None:
     """Print that the kernels of a method are being compiled."""
     once = "" if uncached else ", once on this machine"
     print(f"compiling {name!r}{once}: a minute or so ...", file=sys.stderr, flush=True)
-
-
-def interrupted() -> bool:
-    """Whether Ctrl-C was pressed since the call began; a kernel then returns at once, with -1 steps.
-
-    This call clears the signal, so the caller has to raise it again, see `discs.integrators.base.FixedStep`. Plain Python needs no
-    polling.
-    """
-    return False
-
-
-def _tell_of_interrupts() -> None:
-    from numba.core import types
-    from numba.extending import overload
-
-    occurred = types.ExternalFunction("PyOS_InterruptOccurred", types.int32())
-
-    @overload(interrupted, jit_options=PART)
-    def _interrupted() -> Callable[[], bool]:
-        return lambda: occurred() != 0
-
-
-later(_tell_of_interrupts)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import interrupted, kernel, part
+from discs.kernels.compiled import kernel, part
+from discs.kernels.interrupts import interrupted
 from discs.kernels.shared import columns, copy, forward
 from discs.skew import Phase
 
@@ -76,7 +77,7 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
         h = first(chain, work, now, inside, c, still, k, rtol, atol, longest)
     evaluations = 2
     while done < times.size:
-        if interrupted():
+        if interrupted(now.q.size):
             return -1, evaluations
         least, rejected = 10 * (np.nextafter(t, np.inf) - t), False
         h = min(max(h, least), longest)

@@ -7,7 +7,8 @@ the functions that steps call, in this folder.
 import numpy as np
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import interrupted, kernel, part
+from discs.kernels.compiled import kernel, part
+from discs.kernels.interrupts import interrupted
 from discs.kernels.limits import TURNED
 from discs.kernels.shared import ahead, columns, disc_by_disc, forward, seen
 from discs.skew import Phase
@@ -70,7 +71,7 @@ def march(
         framing = framed < stops.size and stops[framed] - since == step
         if step == steps and not framing:
             break
-        if step % POLLED == 0 and interrupted():
+        if step % POLLED == 0 and interrupted(POLLED * rows * n):
             return -1, gradients, solves, unconverged, -1, passed, doubted, False, framed
         size = rests[framed] if framing else h
         if do.vanishing(chain) and do.jumps(method):

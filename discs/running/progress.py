@@ -8,8 +8,8 @@ from typing import Any
 class Progress:
     """A progress bar, created after a second: creating one costs as much as a short run."""
 
-    def __init__(self, name: str, total: int) -> None:
-        self._name, self._total, self._started = name, total, clock.perf_counter()
+    def __init__(self, name: str, total: int, unit: str = "step") -> None:
+        self._name, self._total, self._unit, self._started = name, total, unit, clock.perf_counter()
         self._bar: Any = None
 
     def __enter__(self) -> "Progress":
@@ -20,13 +20,13 @@ class Progress:
             self._bar.close()
 
     def update(self, step: int) -> None:
-        """Show the number of steps taken."""
+        """Show the number of steps taken, or of other units."""
         if self._bar is not None:
             self._bar.update(step - self._bar.n)
         elif clock.perf_counter() - self._started > 1:
             from tqdm import tqdm
 
-            self._bar = tqdm(total=self._total, initial=step, desc=self._name, unit="step")
+            self._bar = tqdm(total=self._total, initial=step, desc=self._name, unit=self._unit)
 
 
 NO_BAR = nullcontext()

@@ -11,6 +11,7 @@ from discs.loads.motor import Held
 from discs.loads.shares import Shares
 from discs.problem import Problem
 from discs.running.album import Album
+from discs.running.calls import heed_halt
 from discs.running.failure import SimulationError, blown_up, lost_heading
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.stats import Stats
@@ -65,9 +66,7 @@ class March:
         fixed: Any = None if integrator.adaptive else integrator
         self.twin: FixedStep | None = fixed if self.parameters is not None else None  # steps compiled
         self.explicit = integrator.stability_limit < np.inf
-        self.chunk = CHUNK // self.system.n or 1
-        if self.system.load is not None:
-            self.chunk = min(self.chunk, TABLED)
+        self.chunk = min(CHUNK // self.system.n or 1, CHUNK if self.system.load is None else TABLED)
         self.bound = min(problem.blown_up, sys.float_info.max)  # an infinite energy exceeds it
         if problem.ill_posed:
             warn(problem.ill_posed)
@@ -134,6 +133,7 @@ class March:
 
     def on(self, step: int) -> None:
         """Advance towards a step, not beyond it; not at all if Ctrl-C was pressed and its handler did not raise."""
+        heed_halt()
         before, cost, watch, album, looks = self.memory, vars(self.work).copy(), self.watch, self.album, NO_LOOKS
         try:
             if self.twin is None:

@@ -11,10 +11,10 @@ import pytest
 
 from compare import sweep
 from compare.fingerprint import fingerprint
-from compare.sweep_archive import Archive
 from compare.sweeps import _identity, read
 from discs import simulate
 from discs.chains.twist import untwisting_chain
+from discs.files.results import Archive
 from tests.compare.test_sweeps import deadly, noting, picky
 
 

@@ -1,4 +1,5 @@
-"""The archive of a sweep: a line of JSON that identifies its function, and a line for each result."""
+"""Archives of results, of `compare.sweep` and `discs.simulate_many`: a line of JSON that identifies what was computed, and a line
+for each result."""
 
 import json
 import os
@@ -47,7 +48,7 @@ def read(archive: str | Path) -> list[Result]:
     return _parsed(archive, content)[1] if content else []
 
 
-def _parsed(path: str | Path, content: bytes) -> tuple[dict[str, str], list[Result], int]:
+def _parsed(path: str | Path, content: bytes, name: str = "archive", by: str = "sweep") -> tuple[dict[str, str], list[Result], int]:
     """The first line of an archive, its results, and the number of its bytes that are complete lines."""
     whole = content.rfind(b"\n") + 1
     try:
@@ -57,7 +58,7 @@ def _parsed(path: str | Path, content: bytes) -> tuple[dict[str, str], list[Resu
             raise ValueError
         found = {key_of(result.case): result for result in (Result(**json.loads(line)) for line in lines)}
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise ValueError(f"archive must be a file that a sweep has written, or a new one; {path} is neither") from None
+        raise ValueError(f"{name} must be a file that a {by} has written, or a new one; {path} is neither") from None
     return of, list(found.values()), whole
 
 
@@ -67,13 +68,27 @@ class Archive:
     A file that is no archive, belongs to another function, or is in use by another sweep is refused and not changed. A path of None
     stores nothing.
 
+    Parameters
+    ----------
+    function, content : name of what was computed, and its fingerprint.
+    name, by, changed : for errors: of the file, of its writer, and how `content` can differ.
+
     Attributes
     ----------
     found : the results in the file.
     """
 
-    def __init__(self, path: str | Path | None, function: str, content: str) -> None:
+    def __init__(
+        self,
+        path: str | Path | None,
+        function: str,
+        content: str,
+        name: str = "archive",
+        by: str = "sweep",
+        changed: str = "has changed since, or Python has",
+    ) -> None:
         self._path, self._of = path and Path(path), {"function": function, "content": content}
+        self._name, self._by, self._changed = name, by, changed
         self.found: list[Result] = []
 
     def __enter__(self) -> "Archive":
@@ -86,7 +101,7 @@ class Archive:
                     new.write(f"{json.dumps(self._of)}\n".encode())
             self._fd = safe.opened(self._path, os.O_RDWR)
         except (OSError, ValueError) as error:
-            raise ValueError(f"archive must be a file that can be written; {self._path} is not: {error}") from None
+            raise ValueError(f"{self._name} must be a file that can be written; {self._path} is not: {error}") from None
         try:
             self._take(self._path)
         except BaseException:
@@ -96,18 +111,16 @@ class Archive:
 
     def _take(self, path: Path) -> None:
         if not safe.lock(self._fd):
-            raise ValueError(f"archive {path} is being written by another sweep: wait for its end, or take another file")
+            raise ValueError(f"{self._name} {path} is being written by another {self._by}: wait for its end, or take another file")
         with open(os.dup(self._fd), "rb") as file:
-            of, self.found, whole = _parsed(path, file.read())
+            of, self.found, whole = _parsed(path, file.read(), self._name, self._by)
         if of["function"] != self._of["function"]:
-            raise ValueError(f"archive {path} has results of {of['function']}, not of {self._of['function']}; take another file")
-        if of != self._of:
-            why = (
-                "has changed since, or Python has"
-                if "content" in of
-                else "may have changed: an earlier version did not keep what it was"
+            raise ValueError(
+                f"{self._name} {path} has results of {of['function']}, not of {self._of['function']}; take another file"
             )
-            raise ValueError(f"archive {path} has results of {of['function']}, which {why}; take another file")
+        if of != self._of:
+            why = self._changed if "content" in of else "may have changed: an earlier version did not keep what it was"
+            raise ValueError(f"{self._name} {path} has results of {of['function']}, which {why}; take another file")
         os.ftruncate(self._fd, whole)  # removes an incomplete last line
         os.lseek(self._fd, 0, os.SEEK_END)
 

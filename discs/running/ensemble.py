@@ -1,0 +1,183 @@
+"""`simulate_many(problems, ...)`: many problems at once, on all cores or a cluster."""
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import nullcontext
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from discs import checks
+from discs.files import schema
+from discs.files.results import Archive, record
+from discs.integrators import Integrator, find
+from discs.problem import Problem
+from discs.running.calls import HALT, call_each, cores
+from discs.running.engine import ENGINES
+from discs.running.failure import SimulationError
+from discs.running.part import Outcome, Settings, as_data, from_data, run_part
+from discs.running.progress import NO_BAR, Progress
+from discs.running.time_loop import NOTICE
+from discs.runs import Runs
+from discs.warn import warn
+
+MOST = 8  # runs in a part
+
+
+def simulate_many(
+    problems: Iterable[Problem],
+    method: str | Integrator | None = None,
+    dt: float | None = None,
+    frames: int | ArrayLike = 1,
+    want: Iterable[str] = (),
+    progress: bool = True,
+    engine: str = "compiled",
+    tol: float | Mapping[str, float] | None = None,
+    checkpoint: str | Path | None = None,
+    executor: Executor | None = None,
+    threads: int | None = None,
+) -> Runs:
+    """Run many problems.
+
+    Each run is what `simulate` makes of its problem, with its own errors and warnings: a run that fails leaves the others alone.
+
+    Parameters
+    ----------
+    problems : the problems.
+    method, dt, frames, want, engine, tol : as for `simulate`; frames are the last states by default. A tolerance is kept by each
+        run: each has its own search for a step.
+    progress : show a progress bar if it takes more than a second.
+    checkpoint : a file, as "runs.jsonl", to which the runs are written, some at a time. If it exists, only the runs that are
+        missing are computed; the result has the same bits.
+    executor : any `concurrent.futures` executor; for a cluster Dask's, `distributed.Client(address).get_executor()`. It is given
+        parts of several runs each.
+    threads : number of threads if there is no executor; None for one for each core.
+
+    Returns
+    -------
+    `discs.runs.Runs`: a sequence of Solutions, with arrays over all runs, as `runs.x` (runs, frames, discs), with `runs.failed`
+    and `runs.warned`, and `runs.to_xarray()`. It warns once for all warnings and failures.
+
+    Raises
+    ------
+    ValueError : for no problems, or arguments that no run can take; for a checkpoint of other runs, or of something else.
+    KeyboardInterrupt : on Ctrl-C; with a checkpoint the parts that are done are kept.
+    """
+    given = tuple(problems)
+    for problem in given:
+        if not isinstance(problem, Problem):
+            raise ValueError(f"simulate_many takes Problems, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
+    if not given:
+        raise ValueError("simulate_many takes at least one problem; got none")
+    if dt is not None and tol is not None:
+        raise ValueError("give dt or tol, not both: tol finds the step")
+    if dt is not None:
+        dt = checks.number("dt", dt, positive=True)
+    if method is not None and method != "auto":
+        method = find(method)
+    threads = cores() if threads is None else checks.whole("threads", threads, 1)
+    asked = (want,) if isinstance(want, str) else tuple(want)
+    settings = Settings(method, dt, tol, frames, asked, checks.choice("engine", engine, ENGINES))
+    done = _run(given, settings, checkpoint, executor, threads, progress)
+    runs = Runs(
+        given, [block for outcome in done for block in outcome.blocks], *(_merged(done, name) for name in ("failed", "warned"))
+    )
+    _report(runs)
+    return runs
+
+
+def parts_of(problems: Sequence[Problem]) -> list[list[int]]:
+    """The numbers of the runs of each part. It depends on nothing but the problems, so runs that continue have the same parts."""
+    return [list(range(first, min(first + MOST, len(problems)))) for first in range(0, len(problems), MOST)]
+
+
+def _run(
+    problems: tuple[Problem, ...],
+    settings: Settings,
+    checkpoint: str | Path | None,
+    executor: Executor | None,
+    threads: int,
+    progress: bool,
+) -> list[Outcome]:
+    """All outcomes; the arguments are those of `simulate_many`."""
+    rest, done, halt = dict(enumerate(parts_of(problems))), dict[int, Outcome](), Event()
+    told = "" if checkpoint is None else _fingerprint(problems, settings)
+    words = "checkpoint", "simulate_many", "are not of these problems or arguments"
+    shown = Progress("runs", len(problems), "run") if progress else None
+    with Archive(checkpoint, "discs.simulate_many", told, *words) as kept, shown or NO_BAR:
+        for found in kept.found:
+            number, numbers = found.case
+            if rest.get(number) == numbers:
+                done[number] = from_data(found.value)
+                del rest[number]
+        count = len(problems) - sum(map(len, rest.values()))
+
+        def took(number: int, future: Future[Outcome]) -> None:
+            nonlocal count
+            done[number] = future.result()
+            if checkpoint is not None:
+                kept.write(record([number, rest[number]], as_data(done[number])))
+            count += len(rest[number])
+            if shown is not None:
+                shown.update(count)
+
+        calls = {k: (numbers, [problems[i] for i in numbers], settings) for k, numbers in rest.items()}
+        pool = nullcontext(executor) if executor else ThreadPoolExecutor(threads, initializer=HALT.set, initargs=(halt,))
+        with _notice(settings, progress), pool as workers:
+            try:
+                call_each(workers, run_part, calls, took)
+            except BaseException:
+                halt.set()
+                raise
+    if len(done) < len(calls):
+        raise RuntimeError("the executor broke before all runs were done; give another, or none")
+    return [done[k] for k in sorted(done)]
+
+
+def _notice(settings: Settings, progress: bool) -> Any:
+    """Says so if kernels are compiled for long."""
+    if not progress or settings.engine == "plain":
+        return nullcontext()
+    from discs.kernels.compiled import compiling, say_so
+
+    name = settings.method.name if isinstance(settings.method, Integrator) else settings.method or "auto"
+    return compiling(lambda: say_so(name), NOTICE)
+
+
+def _fingerprint(problems: tuple[Problem, ...], settings: Settings) -> str:
+    """A hash of all problems and settings."""
+    found = hashlib.sha256()
+    frames = settings.frames if isinstance(settings.frames, int) else np.asarray(settings.frames).tolist()
+    found.update(repr((*settings._replace(frames=frames),)).encode())
+    for problem in problems:
+        numbers, arrays = schema.describe(problem)
+        found.update(schema.as_text(numbers).encode())
+        for name in sorted(arrays):
+            found.update(name.encode() + np.ascontiguousarray(arrays[name]).tobytes())
+    return found.hexdigest()
+
+
+def _merged(done: list[Outcome], name: str) -> Any:
+    """The entries of a dictionary of all outcomes, in the order of the runs."""
+    entries = [entry for outcome in done for entry in getattr(outcome, name).items()]
+    return dict(sorted(entries, key=lambda entry: entry[0]))
+
+
+def _report(runs: Runs) -> None:
+    """Warn of failures and of the runs' own warnings; raise the first error if no run can take the arguments."""
+    count, failed, warned = len(runs), runs.failed, runs.warned
+    if len(failed) == count and not any(isinstance(error, SimulationError) for error in failed.values()):
+        raise next(iter(failed.values()))
+    said = []
+    if failed:
+        number, error = next(iter(failed.items()))
+        said.append(f"{len(failed)} of {count} runs failed, as run {number}: {error}; see runs.failed")
+    if warned:
+        number, messages = next(iter(warned.items()))
+        said.append(f"{len(warned)} of {count} runs have warnings, as run {number}: {messages[0]}; see runs.warned")
+    if said:
+        warn("; ".join(said))
