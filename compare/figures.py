@@ -128,7 +128,8 @@ def loads(found: Mapping[str, Sequence[Study]]) -> Axes:
         ax.xaxis.set_major_formatter(ScalarFormatter())
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.grid(alpha=0.3, which="major")
-        ax.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))  # below: no line is covered
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12)}  # no line is covered
+        ax.legend(fontsize=8, ncols=2, handlelength=3.5, **below)
     axes[0].set_ylabel("largest error over discs and fields (length, rad)")
     first: Axes = axes[0]
     return first

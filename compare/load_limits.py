@@ -148,10 +148,13 @@ def load_limits(out: str | Path, progress: bool = True, n: tuple[int, ...] = SIZ
 
 
 def _rows(found: dict[str, list[Study]]) -> Iterable[tuple[str, ...]]:
-    yield "load", "ends", "N", "error", "order", "field's error"
+    """A row for each size; the spread, by how much the orders before the last differ from it, is the error bar of the last."""
+    yield "load", "ends", "N", "error", "order", "spread", "field's error"
     for name, studies in found.items():
         for each in studies:
             worst = each.error.max(axis=1)
             orders = np.log(worst[:-1] / worst[1:]) / np.log(each.k[:-1] / each.k[1:])
-            for n, error, order in zip(each.n, worst, ["", *(f"{o:.2f}" for o in orders)], strict=True):
-                yield name, each.ends, str(n), f"{error:.3e}", order, f"{each.floor:.0e}"
+            told = ["", *(f"{order:.2f}" for order in orders)]
+            spreads = [""] * orders.size + [f"{np.abs(orders[-3:] - orders[-1]).max():.2f}" if orders.size > 1 else ""]
+            for n, error, order, spread in zip(each.n, worst, told, spreads, strict=True):
+                yield name, each.ends, str(n), f"{error:.3e}", order, spread, f"{each.floor:.0e}"

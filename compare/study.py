@@ -36,7 +36,7 @@ def convergence(
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame must be at the end of the scene.
     dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
-    method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscous bending, "gauss8" for degree 2 and with
+    method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscosity, "gauss8" for degree 2 and with
         ground forces, in which waves that steps do not resolve are large.
     degree : see `lump`.
     want : further quantities, "velocity", "slope", "energy_density", "contact_force"; see `compare.quantities`. A given field must
@@ -52,7 +52,7 @@ def convergence(
         )
     h = scene.duration / max(300, 8 * field.stats.get("steps", 0)) if dt is None else checks.number("dt", dt, positive=True)
     if method is None:
-        composed = Gauss6(tolerance=1e-10) if viscous(scene) else Suzuki4(Midpoint(tolerance=1e-10))
+        composed = Gauss6(tolerance=1e-10) if viscous(scene, "torsion", "bending") else Suzuki4(Midpoint(tolerance=1e-10))
         method = Gauss8(tolerance=1e-13) if degree == 2 or "contact_force" in want else composed
     fields = compared(scene)
     more = Limit(scene, field, want)

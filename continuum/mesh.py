@@ -19,9 +19,9 @@ from discs.loads.binding import given
 UNSEEN = 1 / 4  # of an energy: discs that miss more than this do not resolve the initial fields
 
 
-def viscous(scene: Scene) -> bool:
-    """Whether bending is viscous, stiff on a fine mesh: compositions have steps back in time, in which it amplifies."""
-    return any(given(load.bending) for load in scene.loads if isinstance(load, Damping))
+def viscous(scene: Scene, *springs: str) -> bool:
+    """Whether these springs, "torsion" or "bending", are viscous: stiff on a fine mesh, where steps back in time amplify."""
+    return any(given(getattr(load, spring)) for load in scene.loads if isinstance(load, Damping) for spring in springs)
 
 
 def semidiscretise(scene: Scene, n: int, ends: str, degree: int = 1) -> Problem:

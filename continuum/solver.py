@@ -132,7 +132,7 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
     tol, fields = min(bound.values()), (*FIELDS, *arrays(want, scene.closed))
     # the tolerance of sweeps is far below tol, as their errors add up over the steps
     middle = Midpoint(tolerance=min(1e-10, 1e-5 * tol))
-    method = middle if viscous(scene) else Suzuki4(middle)
+    method = middle if viscous(scene, "bending") else Suzuki4(middle)
 
     def mesh(n: int) -> Problem:
         return semidiscretise(scene, n - 1 if scene.closed else n, "consistent")
