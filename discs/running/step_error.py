@@ -4,8 +4,9 @@ One to eight of a run's N steps, spread over the run, are sampled ("looks"); the
 defect of the step, |q_{n+1} - 3 q_n + 3 q_{n-1} - q_{n-2}|/12, about h^3 |q'''|/12, from known positions. The error of a midpoint
 step is (h w)^3/12 of an oscillation of rate w, so the defect is the error of a step of order 2. For steps of higher order that
 resolve the motion it is a bound; the defect of an unresolved oscillation is as large as the oscillation. Errors of smooth motions
-add up. So `step_error` is twice N times the mean defect, relative to the largest value of each of x, y, theta (and phi). Runs of
-one or two steps have no third difference. There the defect is h^2 C (f_m - f_0)/6, from the change of the force C^T grad V between
+add up. So `step_error` is twice N times the mean defect, relative to the largest value of each of x, y, theta (and phi), or to
+LEAST of the largest position or angle, if that is larger: smaller values are rounding. Runs of one or two steps have no third
+difference. There the defect is h^2 C (f_m - f_0)/6, from the change of the force C^T grad V between
 the start and the middle of the step, with f_m = (pi_1 - pi_0)/h.
 
 A step is compared if its look alone would raise the estimate above 1 %, or if a heading turns by more than a radian in it, which
@@ -33,6 +34,7 @@ DOUBTFUL = 0.01  # relative estimate above which a step is compared
 SUSPECTED = 0.02, 1.0  # relative estimates between which a run is computed again ...
 SHORT = 200_000  # ... if steps times discs are at most this: some hundredths of a second
 WARNED = 0.05  # relative estimate above which a run warns
+LEAST = 1e-10  # of the largest position or angle: a row of smaller ones is rounding
 AIM = 1e-3  # relative error for which a warning suggests a step
 HALVINGS = 8  # of a step that did not converge, at most
 
@@ -106,24 +108,30 @@ class Watch:
         """The estimate from the looks done so far."""
         if not self.passed:
             return 0.0
-        seen = self.defects[: self.passed]
-        size = np.maximum.reduce(seen[:, 1])
+        mean = np.add.reduce(self.defects[: self.passed, 0]) / self.passed
+        return float(np.maximum.reduce(mean / self._sizes())) * SAFETY * (self.steps or 1)
+
+    def _sizes(self) -> Float:
+        """What errors are relative to, (rows,)."""
+        size: Float = np.maximum.reduce(self.defects[: self.passed, 1])
+        for kind in (slice(0, 2), slice(2, None)):
+            size[kind] = np.maximum(size[kind], LEAST * np.maximum.reduce(size[kind]))
         size[size == 0] = 1.0
-        return float(np.maximum.reduce(np.add.reduce(seen[:, 0]) / size)) * SAFETY * (self.steps or 1) / self.passed
+        return size
 
     def again(
         self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: Float, h: float, parameters: Parameters
     ) -> float | None:
         """The error against a run with half the step, at the positions kept and at the `last` ones; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
-        size = self.defects[: self.passed, 1].max(axis=0)
+        size = self._sizes()
         steps = [*self.looks.tolist(), self.steps] if self.steps else []
         for step, place in zip(steps, [*self.places, last], strict=True):
             memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), parameters)
             if tally.lost >= 0 or not np.isfinite(memory.hi).all():
                 return None
             done, off = step, np.abs(memory.hi - place).max(axis=1)
-            worst = max(worst, float((off / np.where(size > 0, size, 1.0)).max()))
+            worst = max(worst, float((off / size).max()))
         return 4 / 3 * worst
 
 
