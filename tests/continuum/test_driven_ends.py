@@ -46,6 +46,21 @@ def test_a_driven_end_moves_the_rod_as_linear_waves_do():
     assert run.work[-1] == pytest.approx(run.dissipated[-1], rel=1e-4)  # in a period
 
 
+def test_a_motor_rolls_the_rod_steadily_against_its_resistance(rolling):
+    """theta = c rate (s^2/2 - length s)/beta + rate t on a straight line: the torque is c rate length."""
+    c, rate = 0.4, 0.7
+
+    def roll(s):
+        return c * rate / ROD.torsion_stiffness * (0.5 * s**2 - ROD.length * s)
+
+    scene = straight(1.0, Motor(rate, at=0.0), Damping(rolling=c), omega=rate, rolling=rolling)
+    run = field(replace(scene, initial=lambda s: (s, 0 * s, roll(s), rate + 0 * s)))
+    assert np.abs(run.theta - roll(run.s) - rate * run.t[:, None]).max() < 1e-8
+    assert np.abs(run.y - ROD.radius * rate * run.t[:, None]).max() < 1e-8
+    assert run.reaction == pytest.approx(c * rate * ROD.length, rel=1e-6)
+    assert run.work == pytest.approx(c * rate**2 * ROD.length * run.t, abs=1e-7)
+
+
 DRIVEN = Motor(lambda t: 0.8 * float(SMOOTH(t)), at=0.0), Motor(0.0, at=3.0), Damping(rolling=0.1, torsion=0.1), Torque(0.2, SMOOTH)
 
 

@@ -68,7 +68,6 @@ def test_viscosity_damps_torsion_waves_like_an_oscillator():
         np.testing.assert_allclose(run.theta, np.outer(swing.real, start), atol=close)
 
 
-@pytest.mark.filterwarnings("ignore:.* is too long for this motion")  # which is rounding only
 @pytest.mark.parametrize("steered", [False, True])
 def test_a_rod_at_its_rest_shape_stays_there_without_energy(steered):
     problem = uneven(7, Model("springs", "steered" if steered else "field"))
@@ -135,7 +134,7 @@ def test_a_snake_with_wheels_along_its_line_rolls_along_it():
 
 @pytest.mark.slow
 def test_a_driven_rest_shape_does_the_work_of_its_links():
-    """-int S (a - e) e' dt over the motion, by quadrature of fine frames; also the work of a cycle of an actuator."""
+    """-int S (a - e) e' dt over the motion, by quadrature of fine frames."""
     problem = replace(uneven(7, KINDS[0]), loads=(Rest(twist=0.7, signal=signals.sine(1.0, 5.0)),))
     run = simulate(problem, "gauss6", 0.02, 1001, progress=False, engine="plain")
     chain, rest = problem.chain, 0.7 * np.sin(5 * run.t)
@@ -143,6 +142,27 @@ def test_a_driven_rest_shape_does_the_work_of_its_links():
     power = -chain.k * moment.sum(axis=1) * 0.7 * 5 * np.cos(5 * run.t)
     np.testing.assert_allclose(run.work, cumulative_simpson(power, x=run.t, initial=0), atol=1e-6)
     assert abs(run.work).max() > 0.1
+
+
+def test_an_actuator_works_for_its_dampers():
+    """R = 0, rest twist a sin(p s) sin(rate t): theta = Im(A e^{i rate t}) cos(p s) in the steady state, p = pi/length.
+
+    With t = 4 sin^2(p k/2)/k^2 the actuator turns discs by -beta a sqrt(t), and
+    (beta t + i rate (c + eta t) - alpha rate^2) A = -beta a sqrt(t). In a period it does the work that the dampers take,
+    pi rate |A|^2 (c + eta t) length/2.
+    """
+    c, eta, a, rate, n = 0.3, 0.2, 0.4, 1.7, 9
+    chain = one_row((), n, torsion_stiffness=0.9, radius=0.0).chain
+    p = np.pi / chain.length
+    t = 4 * np.sin(p * chain.k / 2) ** 2 / chain.k**2
+    wave = np.cos(p * chain.s)
+    size = -0.9 * a * np.sqrt(t) / (0.9 * t + 1j * rate * (c + eta * t) - 0.6 * rate**2)
+    loads = Rest(twist=lambda s: a * np.sin(p * s), signal=signals.sine(1.0, rate)), Damping(rolling=c, torsion=eta)
+    start = State(chain.s, 0 * wave, size.imag * wave, rate * size.real * wave)
+    run = simulate(Problem(chain, start, 2 * np.pi / rate, loads), "gauss8", 0.05, 5, progress=False, engine="plain")
+    np.testing.assert_allclose(run.theta, np.outer((size * np.exp(1j * rate * run.t)).imag, wave), atol=1e-10)
+    taken = np.pi * rate * abs(size) ** 2 * (c + eta * t) * chain.length / 2
+    assert [run.work[-1], run.dissipated[-1]] == pytest.approx([taken, taken], rel=1e-8)
 
 
 def test_a_potential_of_ones_own_is_part_of_the_energy():

@@ -114,7 +114,7 @@ def test_the_balance_of_a_motor_is_exact_after_any_number_of_sweeps(kernels_as_p
         assert abs(run.energy - problem.energy() - run.work + run.dissipated).max() < 1e-14 * abs(run.energy).max()
 
 
-def test_a_motor_pulls_a_row_of_discs_steadily():
+def test_a_motor_speeds_a_disc_up():
     """Without springs a driven disc accelerates alone: its torque is inertia times acceleration, its work the kinetic energy."""
     chain = Chain(
         n=5, length=2.0, density=1.3, spin_inertia=0.6, torsion_stiffness=0.0, bending_stiffness=0.0, radius=0.7, rolling="unit"
@@ -125,6 +125,26 @@ def test_a_motor_pulls_a_row_of_discs_steadily():
     moved = run.omega[:, 2]
     np.testing.assert_allclose(moved, 0.6 * run.t, atol=1e-12)
     np.testing.assert_allclose(run.work, 0.5 * inertia * moved**2, rtol=1e-6, atol=1e-12)
+
+
+@models([KINDS[0], KINDS[1], KINDS[3]])
+def test_a_motor_rolls_a_rod_steadily_against_its_resistance(model, kernels_as_python):
+    """beta theta' = c rate (s - length) carries what resists beyond s: the whole rod rolls at the rate of its first disc.
+
+    The straight line stays straight, as all discs roll alike. The torque is c rate length, its work what the dampers take.
+    """
+    problem = uneven(7, model, equal=True)
+    chain, c, rate = problem.chain, 0.4, 0.7
+    roll = c * rate / 0.9 * (0.5 * chain.s**2 - chain.length * chain.s)
+    own = {"phi": 0 * roll} if model.law == "steered" else {}
+    steady = replace(problem, initial=State(chain.s, 0 * roll, roll, rate, **own), loads=(Motor(rate, 0.0), Damping(rolling=c)))
+    for method in ("midpoint", "suzuki4", "gauss6", "radau5"):
+        for engine in ("compiled", "plain"):
+            run = simulate(steady, method, 0.05, 3, progress=False, engine=engine)
+            np.testing.assert_allclose(run.theta, roll + rate * run.t[:, None], atol=1e-11)
+            np.testing.assert_allclose(run.y, 0.7 * rate * run.t[:, None] * np.ones(7), atol=1e-11)
+            np.testing.assert_allclose(run.reaction, c * rate * chain.length, rtol=1e-9)
+            np.testing.assert_allclose([run.work, run.dissipated], [c * rate**2 * chain.length * run.t] * 2, atol=1e-11)
 
 
 def test_a_held_end_reacts_with_the_moment_of_the_rod():
