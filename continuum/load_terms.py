@@ -69,9 +69,9 @@ class Terms:
         """A pattern at the places, (S,)."""
         return read(f"{name} of {type(load).__name__}", getattr(load, name), self.s, least)
 
-    def shared(self, load: Any, name: str) -> Float:
+    def shared(self, load: Any, name: str, least: float | None = None) -> Float:
         """A pattern times the weights, (S,), or the number at the place of a point load."""
-        values = self.at(load, name)
+        values = self.at(load, name, least)
         if load.at is None:
             return self.w * values
         if callable(getattr(load, name)):
@@ -181,9 +181,7 @@ def _(load: Slope, to: Terms) -> None:
 
 @add.register
 def _(load: Spring, to: Terms) -> None:
-    stiffness = to.shared(load, "stiffness")
-    if (stiffness < 0).any():
-        raise ValueError(f"stiffness of Spring must be at least 0; got {stiffness.min():g}")
+    stiffness = to.shared(load, "stiffness", 0.0)
     x, y = to.at(load, "x"), to.at(load, "y")
     to.stiffness += stiffness
     to.push[X] += stiffness * x

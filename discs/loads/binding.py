@@ -37,18 +37,21 @@ class OnRod(ABC):
         """A pattern at places (m,) along the rod, (m,)."""
         return sampled(f"{name} of {self._name}", pattern, places, least)
 
-    def _shared(self, chain: Discs, at: float | None, **patterns: Pattern) -> list[Float]:
+    def _shared(self, chain: Discs, at: float | None, least: float | None = None, **patterns: Pattern) -> list[Float]:
         """Patterns per length times the shares of the discs, (n,); numbers for the disc nearest to `at`, if that is given."""
         if at is None:
-            return [self._sampled(name, pattern, within(chain, chain.s)) * chain.w for name, pattern in patterns.items()]
+            return [self._sampled(name, pattern, within(chain, chain.s), least) * chain.w for name, pattern in patterns.items()]
         disc = self._disc(chain, at)
-        return [np.where(np.arange(chain.n) == disc, self._number(name, value), 0.0) for name, value in patterns.items()]
+        return [np.where(np.arange(chain.n) == disc, self._number(name, value, least), 0.0) for name, value in patterns.items()]
 
-    def _number(self, name: str, value: Pattern) -> float:
+    def _number(self, name: str, value: Pattern, least: float | None = None) -> float:
         """A pattern of a load at a point."""
         if callable(value) or np.ndim(value):
             raise ValueError(f"{name} of {self._name} with at= is one number; got {checks.shown(value)}")
-        return checks.number(f"{name} of {self._name}", value)
+        number = checks.number(f"{name} of {self._name}", value)
+        if least is not None and number < least:
+            raise ValueError(f"{name} of {self._name} must be finite and at least {least:g}; got {number:g}")
+        return number
 
     def _disc(self, chain: Discs, at: float) -> int:
         """The disc nearest to a place along the rod, which may be beyond its end by rounding."""

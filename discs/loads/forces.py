@@ -83,9 +83,7 @@ class Spring(OnRod):
     at: float | None = None
 
     def on(self, chain: Discs) -> Linear:
-        (stiffness,) = self._shared(chain, self.at, stiffness=self.stiffness)
-        if (stiffness < 0).any():
-            raise ValueError(f"stiffness of Spring must be at least 0; got {stiffness.min():g}")
+        (stiffness,) = self._shared(chain, self.at, 0.0, stiffness=self.stiffness)
         x, y = (self._place(name, value, chain) for name, value in (("x", self.x), ("y", self.y)))
         if self.at is not None and chain.ends == "ring" and self.at > chain.length - chain.k / 2:
             x, y = x - chain.shift[0], y - chain.shift[1]  # the disc at s = 0 is that at s = length one period back
@@ -94,6 +92,7 @@ class Spring(OnRod):
             stiffness=spread(chain, {0: stiffness, 1: stiffness}),
             offset=0.5 * float(stiffness @ (x * x + y * y)),
             floor=0.0,
+            about=spread(chain, {0: x, 1: y}),
         )
 
     def _place(self, name: str, value: Pattern, chain: Discs) -> Float:

@@ -50,6 +50,7 @@ class Linear(Load):
     drives : the parts that depend on time.
     section : see `Load`; the load then has no compiled form.
     bends : rest curvature and viscosity of bending of slaved headings, whose force and potential are added; None for none.
+    about : places (rows, n) of springs: the potential is summed from there, so stiff springs far from the origin lose no digits.
     degree : of the chain's elements, where there is viscosity: for 2, B v and its transpose are those of `discs.chains.elements`.
     floor : a lower bound of the potential, or of its sum with that of the springs; None for the one where stiffness q = constant.
 
@@ -69,6 +70,7 @@ class Linear(Load):
     bends: Bends | None = None
     floor: float | None = None
     degree: int = 1
+    about: Any = 0.0
 
     def __post_init__(self) -> None:
         names = ("constant", "damping", "stiffness")
@@ -100,10 +102,18 @@ class Linear(Load):
         object.__setattr__(self, "least", least if self.floor is None else self.floor)
 
     def potential(self, t: float, q: Float) -> float:
-        own = self.offset + 0.5 * float(np.sum(self.strain**2)) + float(np.vdot(0.5 * self.stiffness * q - self.constant, q))
+        (there, slope), away = self._there, q - self.about
+        own = there + 0.5 * float(np.sum(self.strain**2)) + float(np.vdot(0.5 * self.stiffness * away + slope, away))
         if self.bends is not None:
             own += self.bends.potential(self.bends.rest, q)
         return own + self.driven(t, q) if self.drives else own
+
+    @cached_property
+    def _there(self) -> tuple[float, Float]:
+        """The potential at `about`, without strains, and its gradient there."""
+        about = np.broadcast_to(self.about, self.constant.shape)
+        slope = self.stiffness * about - self.constant
+        return self.offset + 0.5 * float(np.vdot(slope - self.constant, about)), slope
 
     def driven(self, t: float, q: Float) -> float:
         total, strain = 0.0, self.strain

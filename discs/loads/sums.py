@@ -101,10 +101,12 @@ def total(loads: tuple[Load, ...]) -> Load | None:
 
 def _linear(loads: list[Linear]) -> Linear:
     """The sum of linear loads."""
+    stiffness = np.sum([load.stiffness for load in loads], axis=0)
+    moments = np.sum([load.stiffness * load.about for load in loads], axis=0)
     return Linear(
         constant=np.sum([load.constant for load in loads], axis=0),
         damping=np.sum([load.damping for load in loads], axis=0),
-        stiffness=np.sum([load.stiffness for load in loads], axis=0),
+        stiffness=stiffness,
         viscosity=_present(loads, "viscosity"),
         section=_present(loads, "section"),
         bends=_bends([load.bends for load in loads if load.bends is not None]),
@@ -113,6 +115,7 @@ def _linear(loads: list[Linear]) -> Linear:
         drives=tuple(drive for load in loads for drive in load.drives),
         floor=_floor(loads),
         degree=max(load.degree for load in loads),
+        about=np.divide(moments, stiffness, out=np.zeros_like(moments), where=stiffness > 0),
     )
 
 

@@ -26,7 +26,8 @@ from tests.continuum.test_loaded_fields import straight
         ((Damping(rolling=-1.0),), r"rolling of Damping must be .*at least 0"),
         ((Damping(bending=-1.0),), r"bending of Damping must be .*at least 0"),
         ((Rest(shear=1.0),), r"shear is for rods with headings of their own"),
-        ((Spring(0, 0, -1.0),), r"stiffness of Spring must be at least 0; got -"),
+        ((Spring(0, 0, -1.5),), r"stiffness of Spring must be .*at least 0; got -1\.5"),
+        ((Spring(0, 0, -1.5, at=3.0),), r"stiffness of Spring must be .*at least 0; got -1\.5"),
         ((Torque(1.0, lambda t: np.nan),), r"Torque: the signal .* finite numbers; got nan at t = "),
         ((Torque(1.0, lambda t: np.random.default_rng().random()),), r"the signal of Torque must be a function of the time"),
         (

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from continuum import Scene, SteeredRod, solve
-from discs import Chain, KahanLi6, Problem, State, simulate
+from discs import Chain, KahanLi6, Midpoint, Problem, State, simulate
 from discs.chains.twist import untwisting_chain
-from discs.loads import Damping, Linear, Motor, Spring, Torque, signals
+from discs.loads import Damping, Linear, Motor, Slope, Spring, Torque, signals
 from discs.simulation import doubted
 from tests.conftest import Model, uneven
 
@@ -24,6 +24,17 @@ def test_substeps_back_in_time_amplify_fast_dampers(kernels_as_python):
     slow = replace(problem, loads=(Damping(rolling=0.1),))
     run = simulate(slow, "kahanli6", 0.05, frames=2, progress=False, engine="plain")  # without a warning
     assert run.dissipated[-1] > 0
+
+
+def test_stiff_springs_keep_the_balance_far_from_the_origin():
+    """The potential is summed from the places of springs: half the stiffness times x^2 is 1e9 here, and the energy about 3."""
+    problem = uneven(5, Model("springs", "field"))
+    start = replace(problem.initial, x=np.asarray(problem.initial.x) + 1.0)
+    loads = Spring(start.x, start.y, 1e8), Spring(np.asarray(start.x) + 1e-3, start.y, 1e5), Slope(0.3, 0.1)
+    problem = replace(problem, initial=start, loads=(*loads, Damping(rolling=0.1), Torque(0.2, signals.sine(1.0, 2.0))))
+    run = simulate(problem, Midpoint(tolerance=1e-15), 0.05, 5, progress=False, engine="plain")
+    off = run.energy - problem.energy() - run.work + run.dissipated
+    assert abs(off).max() < 1e-12 * abs(run.energy).max()
 
 
 def test_dampers_that_give_energy_are_told():
