@@ -102,24 +102,26 @@ class Problem:
                 )
             if isinstance(load, Linear):
                 for drive in load.drives:
-                    signals.values(drive.signal, np.array([0.0, self.duration]), drive.name)
+                    signals.check(drive.signal, self.duration, drive.name)
             if isinstance(load, Held):
                 self._check_motor(load)
 
     def _check_forces(self) -> None:
-        """Refuse forces of the initial state that are no finite numbers for each coordinate and disc."""
+        """Refuse forces of the initial state that are no finite numbers for each coordinate and disc, or not always the same."""
         z, system = self.start(), self.system
         v = system.forward(system.basis(system.shape(z.hi)), z.pi)
-        for load in self.bound:
-            force = np.asarray(load.force(0.0, z.hi.copy(), v.copy()), dtype=float)
+        for name, load in zip((type(given).__name__ for given in self.loads), self.bound, strict=True):
+            force, again = (np.asarray(load.force(0.0, z.hi.copy(), v.copy()), dtype=float) for _ in range(2))
             if force.shape != v.shape or not np.isfinite(force).all():
                 got = f"shape {force.shape}" if force.shape != v.shape else "values that are not finite"
-                raise ValueError(f"{type(load).__name__}: the force must be finite numbers of shape {v.shape}; got {got} at t = 0")
+                raise ValueError(f"{name}: the force must be finite numbers of shape {v.shape}; got {got} at t = 0")
+            if (force != again).any():
+                raise ValueError(f"{name}: the force must be a function of t, q and v; it has other values when asked again")
 
     def _check_motor(self, load: Held) -> None:
         """Refuse a rate that differs from that of the initial state, or is not finite at the end."""
         (axle,), (rate,) = load.axles, load.rates(0.0)
-        load.rates(self.duration)
+        signals.check(axle.rate, self.duration, "Motor")
         name = "omega" if axle.row == 2 else "phi_rate"
         initial = np.broadcast_to(getattr(self.initial, name), self.chain.n)[axle.disc]
         if not abs(initial - rate) <= 1e-9 * max(1.0, abs(rate)):

@@ -155,6 +155,16 @@ class steady(Named):
 NAMES: dict[str, type[Named]] = {cls.__name__: cls for cls in (sine, ramp, pulse, smooth, table)}
 
 
+def check(signal: Signal, duration: float, name: str) -> None:
+    """ValueError unless a signal gives finite numbers at the start and the end of a run, the same ones when it is asked again."""
+    times = np.array([0.0, duration])
+    first, again = values(signal, times, name), values(signal, times, name)
+    if (first != again).any():
+        i = int(np.argmax(first != again))
+        need = f"{name}: the signal {checks.shown(signal)} must be a function of t"
+        raise ValueError(f"{need}; at t = {times[i]:g} it gave {first[i]:g} and then {again[i]:g}: take signals.table(t, values)")
+
+
 def values(signal: Signal, times: Float, name: str) -> Float:
     """A signal at times (m,). ValueError with `name`, the load's, and the time if it gives anything but finite real numbers."""
     found = signal(times) if isinstance(signal, Named) else np.array([_value(signal, float(t), name) for t in times])

@@ -7,9 +7,16 @@ import pytest
 
 from discs import Midpoint, simulate
 from discs.kernels import protocol as do
-from discs.loads import Custom, Damping, Force, Linear, Potential, Rest, Slope, Spring, Torque, signals
+from discs.loads import Custom, Damping, Force, Linear, Motor, Potential, Rest, Slope, Spring, Torque, signals
 from tests.conftest import uneven
 from tests.discs.test_loads import KINDS
+
+DRAWN = np.random.default_rng(0)
+
+
+def noise(t):
+    """Another number each time, so no function of t."""
+    return DRAWN.random()
 
 
 @pytest.mark.parametrize(
@@ -31,7 +38,8 @@ from tests.discs.test_loads import KINDS
         (lambda p: Torque(1.0, signal=lambda t: np.ones(2)), "Torque: the signal .* must give a finite number; got .* at t = 0"),
         (lambda p: Torque(1.0, signal=lambda t: 1 / (1 - t) if t < 1 else np.inf), "got inf at t = 1"),
         (lambda p: Torque(1.0, signal=lambda t: "much"), "Torque: the signal .* must give a finite number; got 'much' at t = 0"),
-        (lambda p: Spring(0.0, 0.0, -1.0), "stiffness of Spring must be at least 0"),
+        (lambda p: Spring(0.0, 0.0, -1.5), "stiffness of Spring must be finite and at least 0; got -1.5"),
+        (lambda p: Spring(0.0, 0.0, -1.5, at=1.0), "stiffness of Spring must be finite and at least 0; got -1.5"),
         (lambda p: Slope(np.inf), "gx of Slope must be a finite number"),
         (lambda p: Custom(lambda t, q, v: q[0]), r"Custom: the force must be finite numbers of shape \(3, 7\); got shape \(7,\)"),
         (lambda p: Custom(lambda t, q, v: np.nan * q), "Custom: the force must be finite numbers"),
@@ -49,6 +57,15 @@ from tests.discs.test_loads import KINDS
         (
             lambda p: Potential(lambda x, y: x, lambda x, y: (x, y[:2])),
             r"gradient of Potential must be finite numbers of shape \(7,\)",
+        ),
+        (
+            lambda p: Torque(1.0, noise),
+            "Torque: the signal .* must be a function of t; at t = 0 it gave .* and then",
+        ),
+        (lambda p: Motor(lambda t: 0.5 + t * noise(t), 0.0), "Motor: the signal .* must be a function of t; at t = 1 it gave"),
+        (
+            lambda p: Custom(lambda t, q, v: noise(t) + 0 * q),
+            "Custom: the force must be a function of t, q and v",
         ),
         (lambda p: Custom(3), "force and power of Custom must be functions"),
         (lambda p: Potential(lambda x, y: x, None), "gradient of Potential must be a function"),
