@@ -26,6 +26,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from discs.kernels.lean import lean
 from discs.warn import warn
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
@@ -38,7 +39,6 @@ UNUSED = 86_400.0  # seconds without use after which kernels of earlier content 
 CUT = -1, 0, 0  # the cost of a step that Ctrl-C interrupted
 Cost = tuple[int, int, int]  # of a step: gradients, solves, unconverged iterations
 
-_ONE = threading.RLock()  # one thread at a time sets where numba keeps a kernel
 _WAITING: list[Callable[[], object]] = []  # registrations to be made with numba
 _MODULES: dict[str, dict[str, Any]] = {}  # modules with parts, forms or kernels, and their contents
 _FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
@@ -131,9 +131,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
             if isinstance(argument, tuple):
                 kinds += tuple(map(type, argument))
         if kinds not in known:
-            with _ONE:
-                if kinds not in known:
-                    known[kinds] = compiled(function, *(kind for kind in kinds if kind in _FORMS))
+            with lean():
+                made = known.get(kinds) or compiled(function, *(kind for kind in kinds if kind in _FORMS))
+                result = made(*arguments)
+                known[kinds] = made
+            return result
         return known[kinds](*arguments)
 
     return call
