@@ -11,7 +11,7 @@ from continuum.rod import Rod
 from discs import Chain, SimulationError
 from discs.arrays import Float
 from discs.chains.chain import FEWEST
-from discs.simulation import ENERGY_DRIFT_WARNING
+from discs.running.doubt import ENERGY_DRIFT_WARNING
 
 TURN = 0.08  # rad per step of the fastest link; it kept the energy to 1 % in all 43 random cases that had been inaccurate
 BLOWN_UP = 10.0  # times the initial energy

@@ -15,10 +15,22 @@ from continuum.rod import Scene
 from continuum.stepping import Steps
 from continuum.wants import with_inside
 from discs.arrays import Float
+from discs.kernels.background import Kernels, usual
 from discs.skew import Phase
 
 NODES = 1025  # nodes of a solution, enough for splines and their derivatives; more if the initial fields are narrow
 MOST_NODES = 8192
+FEWEST = 19  # functions of a step that only compiles
+
+
+_PREPARED: set[tuple[type, ...]] = set()  # kinds of rods whose kernels are there
+
+
+def first_step(scene: Scene, stages: int) -> None:
+    """Take a short step of a scene, which compiles its kernel or reads it from disc."""
+    rod = SpectralRod(scene, FEWEST, Density.of(resolve(scene)))
+    moments = np.array([1e-6 * scene.duration])
+    list(Steps(rod, moments[0], 1e-3, stages, moments[0]).at(moments))
 
 
 class Motion(NamedTuple):
@@ -49,7 +61,8 @@ class Runner:
     ----------
     times : (F,), the times at which fields are compared and returned.
     stages : number of stages of a step.
-    compiled : whether to use `continuum.kernels` or the plain twin.
+    compiled : whether to use `continuum.kernels` or the plain twin; None for the twin until they are compiled, in the background,
+        unless DISCS_ENGINE in the environment is "compiled" or "plain".
     want : further quantities, see `continuum.wants`.
 
     Attributes
@@ -57,7 +70,7 @@ class Runner:
     s : (S,), the places at which fields are returned.
     """
 
-    def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool = True, want: tuple[str, ...] = ()) -> None:
+    def __init__(self, scene: Scene, times: Float, stages: int, compiled: bool | None = None, want: tuple[str, ...] = ()) -> None:
         self._scene, self.times, self._compiled, self.stages, self._want = scene, times, compiled, stages, want
         initial, length = resolve(scene), scene.rod.length
         narrowest = min((width for _, width in initial.features), default=length)
@@ -71,7 +84,7 @@ class Runner:
     def run(self, n: int, tolerance: float) -> Motion:
         rod = SpectralRod(self._scene, n, self._density)
         watch = EndIdentities(rod) if "contact_force" in self._want and hold(self._scene) else None
-        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._compiled, watch)
+        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._kernels(rod), watch)
         at, initial = rod.reader(self.s), self._scene.fields(self.s)
         begun = at(rod.start)
         states = list(steps.at(self.times))
@@ -91,6 +104,18 @@ class Runner:
             balance[:, 0] += rod.loads.driven(self.times, every.hi + every.lo) - rod.loads.driven(np.zeros(1), rod.start.hi[None])
             reaction = np.concatenate(steps.reaction) if rod.loads.held.size else None
         return Motion(rod, states, fields, start, n, tolerance, len(steps.lengths), balance, reaction)
+
+    def _kernels(self, rod: SpectralRod) -> bool | Kernels:
+        """Whether to use kernels."""
+        if self._compiled is not None or (engine := usual()) != "auto":
+            return engine != "plain" if self._compiled is None else self._compiled
+        key = type(rod.parameters), *map(type, rod.parameters)
+        if key not in _PREPARED:
+            there = Kernels(first_step, self._scene, self.stages)
+            if not there:
+                return there
+            _PREPARED.add(key)
+        return True
 
     def _wanted(
         self, rod: SpectralRod, states: list[Phase], watch: EndIdentities | None, integrals: list[Float]

@@ -28,6 +28,7 @@ from continuum.galerkin import SpectralRod
 from continuum.modes import Modes, Pencil
 from discs import SimulationError
 from discs.arrays import Complex, Float
+from discs.kernels.background import Kernels
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Phase
 
@@ -76,7 +77,7 @@ class Steps:
     duration : time at which the last step ends.
     tolerance, stages : of a step.
     first : length of the first step that is tried.
-    compiled : whether to use `continuum.kernels` or the plain twin.
+    compiled : whether to use `continuum.kernels` or the plain twin; asked before each step.
     watch : has rates at the stages of steps, which are integrated.
 
     Attributes
@@ -94,7 +95,7 @@ class Steps:
         tolerance: float,
         stages: int,
         first: float,
-        compiled: bool = True,
+        compiled: bool | Kernels = True,
         watch: EndIdentities | None = None,
     ) -> None:
         self.rod, self._duration, self._tolerance, self._compiled = rod, duration, tolerance, compiled
@@ -171,7 +172,7 @@ class Steps:
 
     def _sweep(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:
         assert self._modes is not None
-        return collocation.step(self.rod, z, self._modes, t, h, self._stages, SWEEPS, self._sweeps, self._compiled)
+        return collocation.step(self.rod, z, self._modes, t, h, self._stages, SWEEPS, self._sweeps, bool(self._compiled))
 
     def _advance(self, t: float, z: Phase) -> tuple[float, Phase, Float, Float]:
         """One converged step from z at t within the tolerance, with the rates and momenta of its stages."""

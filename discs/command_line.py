@@ -64,7 +64,7 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
         "--want", metavar="NAME", nargs="+", default=[], help=f"record also {', '.join((*WANTS, *OFFERS))} (default: none)"
     )
     add_loads(p)
-    p.add_argument("--engine", choices=ENGINES, default="compiled", help="compiled kernels, or NumPy and SciPy (default: compiled)")
+    p.add_argument("--engine", choices=ENGINES, help="auto (default): compiled once kernels are there, else plain, NumPy and SciPy")
     add_saving(p)
 
 

@@ -4,32 +4,33 @@ import time as clock
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators import METHODS, Integrator, OneStep, find, from_settings
+from discs.integrators import Integrator, OneStep, find, from_settings
 from discs.integrators.work import Cut
+from discs.kernels.background import usual
 from discs.problem import Problem
 from discs.running.album import Album
-from discs.running.engine import plain_because
+from discs.running.doubt import doubted
+from discs.running.engine import COMPILING, ENGINES, Overtaken, plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.progress import NO_BAR, Progress
 from discs.running.recording import Recording, Rows, kept_settings
 from discs.running.stats import Stats, of_search
-from discs.running.step_error import WARNED, Watch, cure, doubts
+from discs.running.step_error import Watch
 from discs.running.suggest import suggest_dt
-from discs.running.time_loop import March
+from discs.running.time_loop import March, kernels
 from discs.running.tolerance import USUAL, NotReached, some_of, to_tolerance
 from discs.solution import Solution
 from discs.warn import warn
 
 MOST_STEPS = 2.0**53
 Result = TypeVar("Result")
-ENERGY_DRIFT_WARNING = 0.01  # relative
 
 
 def simulate(
@@ -39,7 +40,7 @@ def simulate(
     frames: int | ArrayLike = 101,
     want: Iterable[str] = (),
     progress: bool = True,
-    engine: str = "compiled",
+    engine: str | None = None,
     tol: float | Mapping[str, float] | None = None,
     checkpoint: str | Path | None = None,
 ) -> Solution:
@@ -63,7 +64,11 @@ def simulate(
     checkpoint : a file, as "run.nc", to which frames are written as they are computed, in bounded memory. If it exists, its run
         continues where it was interrupted, to the same bits as one unbroken run; see docs/archives.md. With a tolerance, method and
         step are found first, by runs of at most 101 frames in memory; a run that continues takes them from its file.
-    engine : "compiled", or "plain" for NumPy and SciPy; `stats["plain_because"]` says why a run is plain.
+    engine : "compiled", which waits until kernels are compiled, once on a machine; "plain" for NumPy and SciPy; "auto", the
+        default: compiled if the kernels are there, otherwise plain while they are compiled in the background, and compiled from the
+        start as soon as they are there. Both agree up to rounding (with step control to the tolerance). `stats["engine"]` tells
+        which it was and `stats["plain_because"]` why a run is plain. With a checkpoint "auto" is "compiled". The environment
+        variable DISCS_ENGINE names another default.
 
     Returns
     -------
@@ -80,7 +85,9 @@ def simulate(
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
-    nothing = method is None and dt is None
+    engine, nothing = checks.choice("engine", engine or usual(), ENGINES), method is None and dt is None
+    if engine == "auto" and checkpoint is not None:
+        engine = "compiled"
     if method == "auto" or tol is not None or nothing:
         if dt is not None:
             raise ValueError("give dt or tol, not both: tol (and method='auto') finds the step")
@@ -90,18 +97,6 @@ def simulate(
     if warning := doubted(problem, found) + doubt:
         warn(warning)
     return found
-
-
-def doubted(problem: Problem, run: Solution) -> str:
-    """The warning for a run that may not be trusted; empty if there is none."""
-    method = run.stats["method"]
-    said = lost_energy(problem, method, run.t, run.energy, run) if run.balance is None else lost_balance(problem, method, run)
-    stats = run.stats
-    doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # first, as it is cheap and most runs pass
-    if doubtful and (reasons := doubts(stats)):
-        joint, cured = "; and " if said else "", cure(run.stats)
-        said += f"{joint}{method}: {'; '.join(reasons)}: the run may not be trusted; take {cured}, or tol=1e-3"
-    return said
 
 
 def _search(
@@ -139,51 +134,15 @@ def _search(
     return found, doubt
 
 
-def lost_balance(problem: Problem, method: str, run: Solution) -> str:
-    """The warning if energy - work + dissipated of a run drifts by more than ENERGY_DRIFT_WARNING of the largest of them."""
-    terms = np.stack([run.energy, run.work, run.dissipated])
-    taken = run.dissipated
-    if _damped(method):  # a short step to a frame has its own error of a fast decay, where the steps are right
-        taken = taken[[steps_before(float(t), run.stats["dt"])[1] == 0 for t in run.t]]
-    if (falls := float(np.diff(taken, prepend=0.0).min(initial=0.0))) < -1e-6 * np.abs(terms).max():
-        way = "take a smaller dt" + ("" if _damped(method) else ', or "radau5"')
-        said = f"dampers only take energy, but between two frames they gave {-falls:.3g}: the run may not be trusted"
-        return f"{method}: {said}; {way}"
-    off = np.abs(run.energy - problem.energy() - run.work + run.dissipated)
-    worst = int(off.argmax())
-    if off[worst] <= ENERGY_DRIFT_WARNING * np.abs(terms).max():
-        return ""
-    return (
-        f"{method}: the change of energy is work less what dampers took, but at t = {run.t[worst]:g} it is off by "
-        f'{off[worst]:.3g}: the run may not be trusted; {_damped(method)}take a smaller dt, or "midpoint"'
-    )
+def _run(*arguments: Any) -> Solution:
+    """One run, as by `_once`; a plain one that its kernels overtake begins anew."""
+    try:
+        return _once(*arguments)
+    except Overtaken:
+        return _once(*arguments)
 
 
-def _damped(method: str) -> str:
-    """The cause of lost energy if a method damps."""
-    return f"{method} damps what its steps do not resolve: " if method in METHODS and METHODS[method].damps else ""
-
-
-def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Solution | None = None) -> str:
-    """The warning if energies (F,) at times (F,) drift from the initial one by more than ENERGY_DRIFT_WARNING; else empty.
-
-    The drift is relative to the largest kinetic energy that is possible or, if loads set no bound, to the largest energy of `run`
-    without that of loads.
-    """
-    off = np.abs(energy - problem.energy())
-    worst, most, load = int(off.argmax()), problem.blown_up / 10, problem.system.load
-    if load is not None and load.conservative and most == np.inf and run is not None:
-        paths = np.stack([getattr(run, row) for row in problem.system.rows], axis=1)
-        most = max(float(e) - load.potential(time, q) for time, e, q in zip(t, energy, paths, strict=True))
-    if off[worst] <= ENERGY_DRIFT_WARNING * most:
-        return ""
-    return (
-        f"{method}: energy is conserved, but at t = {t[worst]:g} it is {energy[worst]:.3g} and not {problem.energy():.3g}: the run "
-        f'may not be trusted; {_damped(method)}take a smaller dt, or a method that keeps energy, as "midpoint"'
-    )
-
-
-def _run(
+def _once(
     problem: Problem,
     integrator: Integrator,
     dt: float | None,
@@ -221,6 +180,11 @@ def _run(
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
+    stepwise = isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
+    recorded = (stepwise or integrator.runs_whole) and checkpoint is None and not want and system.load is None
+    there = kernels(problem, integrator, h, asked=not recorded) if engine == "auto" and not because else True
+    if not there:
+        because = COMPILING
     about: Stats = {
         "method": integrator.name,
         "order": integrator.order,
@@ -239,11 +203,7 @@ def _run(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown or NO_BAR, record:
         if record.complete:
             return record.solution({})
-        album: Album | None = None
-        stepwise = not because and isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
-        whole = not because and integrator.runs_whole
-        if (stepwise or whole) and checkpoint is None and not want and system.load is None:
-            album = Album(system, times, h)
+        album = Album(system, times, h) if recorded and not because else None
         march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want, album)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
         if album is not None and (stepwise or _uncut(march.whole, record, 0, march)):
@@ -253,6 +213,8 @@ def _run(
             before, rest = steps_before(float(times[f]), h)
             while march.step < before:
                 march.on(before)
+                if because == COMPILING and there:
+                    raise Overtaken
                 if shown is not None:
                     shown.update(march.step)
                 if checkpoint is not None:

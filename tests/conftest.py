@@ -1,5 +1,6 @@
 """Chains and problems that the tests share: unequal, non-unit parameters, no symmetry."""
 
+import os
 import signal
 from functools import cache
 from typing import NamedTuple
@@ -12,9 +13,13 @@ from discs import Chain, Problem, State, SteeredChain
 from discs.integrators import METHODS
 from discs.kernels import dop853, driver
 from discs.kernels.__main__ import sharing
+from discs.kernels.background import ENGINE
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job: tests send Ctrl-C, to themselves and to children
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+os.environ[ENGINE] = "compiled"  # the same on every machine, whatever its cache holds; of command lines, too
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -19,8 +19,8 @@ from continuum.scenes import SCENES
 from discs import Leapfrog, Problem, Solution, State, simulate
 from discs.arrays import Float
 from discs.loads import Damping, OnRod
+from discs.running.doubt import lost_energy
 from discs.running.time_loop import March
-from discs.simulation import lost_energy
 
 # Functions of arguments that can be sent to other processes
 

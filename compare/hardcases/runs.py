@@ -16,8 +16,8 @@ from compare.reference import distance, reference
 from discs import Problem, SimulationError, Solution, simulate, suggest_dt
 from discs.arrays import Float
 from discs.integrators import Integrator
+from discs.running.doubt import ENERGY_DRIFT_WARNING
 from discs.running.tolerance import USUAL, NotReached, to_tolerance
-from discs.simulation import ENERGY_DRIFT_WARNING
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")

@@ -56,8 +56,10 @@ def compile_for(law: str, tested: bool) -> None:
                 continue
             if n == MANY and tested and law != "field" and first.name != "midpoint":
                 continue
-            simulate(problem, first, 0.005, frames=1, progress=False)
-            simulate(problem, first, 0.005, frames=1, want="velocity", progress=False)  # frames asked for have kernels of their own
+            simulate(problem, first, 0.005, frames=1, progress=False, engine="compiled")
+            simulate(
+                problem, first, 0.005, frames=1, want="velocity", progress=False, engine="compiled"
+            )  # frames asked for have kernels of their own
             in_lanes = ", in lanes" if n == MANY else ""
             print(f"{words}{in_lanes}: {', '.join(method.name for method in methods)} compiled", flush=True)
 

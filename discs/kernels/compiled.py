@@ -21,6 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache, partial, singledispatch, wraps
 from pathlib import Path
 from types import ModuleType
@@ -39,6 +40,7 @@ UNUSED = 86_400.0  # seconds without use after which kernels of earlier content 
 CUT = -1, 0, 0  # the cost of a step that Ctrl-C interrupted
 Cost = tuple[int, int, int]  # of a step: gradients, solves, unconverged iterations
 
+_READILY = ContextVar("readily", default=False)
 _WAITING: list[Callable[[], object]] = []  # registrations to be made with numba
 _MODULES: dict[str, dict[str, Any]] = {}  # modules with parts, forms or kernels, and their contents
 _FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
@@ -115,6 +117,20 @@ def jit(function: Callable[..., Any]) -> Callable[..., Any]:
     return numba.njit(nogil=True, **OPTIONS)(function)
 
 
+class NotReady(Exception):
+    """A kernel is not in the cache."""
+
+
+@contextmanager
+def readily() -> Iterator[None]:
+    """Within it a kernel that would have to be compiled raises `NotReady`."""
+    token = _READILY.set(True)
+    try:
+        yield
+    finally:
+        _READILY.reset(token)
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator: a function called from Python, compiled at its first call for each combination of parameters.
 
@@ -138,6 +154,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
             return result
         return known[kinds](*arguments)
 
+    call.known = known  # type: ignore[attr-defined]  # for tests
     return call
 
 
@@ -153,6 +170,8 @@ def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
     if not kept:
         _warn_of_no_cache()
         return jit(function)
+    if _READILY.get() and not any(Path(kept).rglob("*.nbi")):
+        raise NotReady
     own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, kept
     try:
         return numba.njit(cache=True, nogil=True, **OPTIONS)(function)

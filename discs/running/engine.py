@@ -5,7 +5,12 @@ from discs.integrators import Integrator
 from discs.loads.own import OwnLoad
 from discs.problem import Problem
 
-ENGINES = ("compiled", "plain")
+ENGINES = ("auto", "compiled", "plain")
+COMPILING = "its kernels are being compiled in the background"
+
+
+class Overtaken(Exception):
+    """The kernels of a plain run are there."""
 
 
 def plain_because(problem: Problem, integrator: Integrator, engine: str, want: tuple[str, ...]) -> str:

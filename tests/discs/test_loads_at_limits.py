@@ -9,7 +9,7 @@ from continuum import Scene, SteeredRod, solve
 from discs import Chain, KahanLi6, Midpoint, Problem, State, simulate
 from discs.chains.twist import untwisting_chain
 from discs.loads import Damping, Linear, Motor, Slope, Spring, Torque, signals
-from discs.simulation import doubted
+from discs.running.doubt import doubted
 from tests.conftest import Model, uneven
 
 STRAIGHT = {"length": 4.0, "density": 1.0, "spin_inertia": 1.0, "torsion_stiffness": 0.8, "bending_stiffness": 0.7, "radius": 1.0}

@@ -1,0 +1,111 @@
+"""Kernels compiled by a process of their own, while runs go on without them: what `engine="auto"` does.
+
+A process is started by the first run that finds a kernel missing, and is sent functions to call, one after the other: each calls
+its kernels once, which compiles them into the cache on disc. It outlives the run that started it, until they are all there. Worker
+processes, and machines without a cache, wait for their kernels instead.
+"""
+
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from discs.kernels.compiled import NotReady, readily
+
+ENGINE = "DISCS_ENGINE"  # in the environment: the engine of runs that are given none
+SECONDS = 1.0  # between two looks whether kernels are there
+
+
+def usual() -> str:
+    """The engine of runs that are given none: the environment variable DISCS_ENGINE, or "auto"."""
+    return os.environ.get(ENGINE) or "auto"
+
+
+class _Compiler:
+    """The process, and what it was asked for."""
+
+    def __init__(self) -> None:
+        self.process: subprocess.Popen[bytes] | None = None
+        self.asked: set[bytes] = set()
+        self.lock = threading.Lock()
+
+    def ask(self, job: bytes) -> bool:
+        """Send a job; False if the process ended before it did all that it was asked."""
+        with self.lock:
+            if self.process is None:
+                environment = os.environ | {ENGINE: "compiled", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+                self.process = subprocess.Popen(
+                    [sys.executable, "-m", "discs.kernels.background"],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    env=environment,
+                    start_new_session=True,  # Ctrl-C is for the run
+                )
+                print("compiling kernels in the background: runs are plain, and slower, until they are there", file=sys.stderr)
+            if self.process.poll() is not None:
+                return False
+            if job not in self.asked:
+                assert self.process.stdin is not None
+                try:
+                    self.process.stdin.write(job)
+                    self.process.stdin.flush()
+                except OSError:
+                    return False
+                self.asked.add(job)
+            return True
+
+
+COMPILER = _Compiler()
+
+
+def missing(prepare: Callable[..., object], *arguments: Any) -> bool:
+    """Whether kernels that prepare(*arguments) calls are missing; they are then compiled in the background.
+
+    prepare is a function of a module, with arguments that can be pickled. If they cannot, in a worker process, and if the process
+    has failed, nothing is missing: the caller waits for its kernels.
+    """
+    try:
+        with readily():
+            prepare(*arguments)
+    except NotReady:
+        if multiprocessing.parent_process() is not None:
+            return False
+        try:
+            job = pickle.dumps((prepare, arguments))
+        except (pickle.PicklingError, AttributeError, TypeError):
+            return False
+        return COMPILER.ask(job)
+    return False
+
+
+class Kernels:
+    """True if the kernels that prepare(*arguments) calls are there; see `missing`. Until they are it looks again, once a second."""
+
+    def __init__(self, prepare: Callable[..., object], *arguments: Any) -> None:
+        self._call = prepare, *arguments
+        self._there, self._looked = not missing(*self._call), time.monotonic()
+
+    def __bool__(self) -> bool:
+        if not self._there and time.monotonic() > self._looked + SECONDS:
+            self._there, self._looked = not missing(*self._call), time.monotonic()
+        return self._there
+
+
+def _serve() -> None:
+    """Call the functions that are sent, until there are no more."""
+    while True:
+        try:
+            prepare, arguments = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        prepare(*arguments)
+
+
+if __name__ == "__main__":
+    _serve()

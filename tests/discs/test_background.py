@@ -1,0 +1,130 @@
+"""Kernels that are compiled in the background: what runs do until they are there."""
+
+import multiprocessing
+import time
+
+import numpy as np
+import pytest
+
+from continuum import motion as fields
+from continuum import solve, untwisting_rod
+from discs import simulate
+from discs.kernels import background, compiled
+from discs.kernels.background import Kernels, missing
+from discs.kernels.compiled import NotReady, kernel, readily
+from discs.running import time_loop
+from tests.conftest import Model, uneven
+
+
+@kernel
+def doubled(x):
+    return 2 * x
+
+
+def prepare(x):
+    doubled(x)
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    """No kernels, and no process that compiles them."""
+    numba = pytest.importorskip("numba")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    compiled._cache.cache_clear()
+    doubled.known.clear()
+    compiler = background._Compiler()
+    monkeypatch.setattr(background, "COMPILER", compiler)
+    yield compiler
+    compiled._cache.cache_clear()
+    if compiler.process is not None:
+        compiler.process.communicate(timeout=60)
+
+
+def test_a_kernel_that_is_not_there_is_compiled_in_the_background(empty_cache, capfd):
+    with readily(), pytest.raises(NotReady):
+        doubled(1.5)
+    there = Kernels(prepare, 1.5)
+    assert not there
+    assert "compiling kernels in the background" in capfd.readouterr().err
+    until = time.monotonic() + 60
+    while not there:
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    assert doubled(1.5) == 3.0
+    assert empty_cache.asked
+
+
+def test_a_worker_process_waits(empty_cache, monkeypatch):
+    monkeypatch.setattr(multiprocessing, "parent_process", lambda: "a process")
+    assert not missing(prepare, 1.5)
+    assert empty_cache.process is None
+
+
+def test_what_cannot_be_sent_is_waited_for(empty_cache):
+    assert not missing(lambda x: doubled(x), 1.5)
+    assert empty_cache.process is None
+
+
+def test_kernels_of_a_process_that_failed_are_waited_for(empty_cache):
+    assert missing(prepare, 1.5)
+    empty_cache.process.kill()
+    empty_cache.process.wait()
+    assert not missing(prepare, 1.5)
+
+
+class After:
+    """Kernels that are there after some questions."""
+
+    def __init__(self, questions):
+        self.left = questions
+
+    def __bool__(self):
+        self.left -= 1
+        return self.left < 0
+
+
+@pytest.fixture
+def kernels_come(monkeypatch):
+    def come(after):
+        there = After(after)
+        monkeypatch.setattr("discs.simulation.kernels", lambda *rest, **more: there)
+        monkeypatch.setattr(fields, "Kernels", lambda *rest: there)
+        monkeypatch.setattr(fields, "_PREPARED", set())
+
+    monkeypatch.setenv(background.ENGINE, "auto")
+    return come
+
+
+def test_a_run_is_plain_until_kernels_are_there_and_then_compiled(kernels_come):
+    problem = uneven(9, Model("springs", "field"), seed=4)
+    kernels_come(10**6)
+    run, plain = (simulate(problem, dt=0.05, engine=engine) for engine in (None, "plain"))
+    np.testing.assert_array_equal(run.x, plain.x)
+    assert run.stats["engine"] == "plain"
+    assert "background" in run.stats["plain_because"]
+    kernels_come(3)
+    overtaken, waited = (simulate(problem, dt=0.05, engine=engine) for engine in ("auto", "compiled"))
+    np.testing.assert_array_equal(overtaken.x, waited.x)
+    assert overtaken.stats["engine"] == "compiled"
+
+
+def test_a_field_goes_on_with_its_kernels(kernels_come):
+    scene = untwisting_rod(duration=0.5)
+    kernels_come(3)
+    mixed = solve(scene, 1e-3, progress=False)
+    kernels_come(0)
+    np.testing.assert_allclose(mixed.x, solve(scene, 1e-3, progress=False).x, atol=1e-11)
+
+
+def test_prepared_kernels_are_not_looked_for_again(monkeypatch):
+    problem = uneven(9, Model("springs", "field"), seed=4)
+    simulate(problem, dt=0.05, engine="compiled")
+    monkeypatch.setattr(time_loop, "Kernels", None)
+    assert simulate(problem, dt=0.05, engine="auto").stats["engine"] == "compiled"
+
+
+def test_the_default_engine_is_checked(monkeypatch):
+    monkeypatch.setenv(background.ENGINE, "fast")
+    with pytest.raises(ValueError, match="engine must be one of 'auto', 'compiled', 'plain'; got 'fast'"):
+        simulate(uneven(9, Model("springs", "field"), seed=4), dt=0.05)
