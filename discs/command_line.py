@@ -64,7 +64,9 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
         "--want", metavar="NAME", nargs="+", default=[], help=f"record also {', '.join((*WANTS, *OFFERS))} (default: none)"
     )
     add_loads(p)
-    p.add_argument("--engine", choices=ENGINES, help="auto (default): compiled once kernels are there, else plain, NumPy and SciPy")
+    p.add_argument(
+        "--engine", choices=ENGINES, help="compiled; plain, NumPy and SciPy; auto, compiled if kernels are there (default: auto)"
+    )
     add_saving(p)
 
 
