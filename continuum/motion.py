@@ -107,11 +107,13 @@ class Runner:
 
     def _kernels(self, rod: SpectralRod) -> bool | Kernels:
         """Whether to use kernels."""
-        if self._compiled is not None or (engine := usual()) != "auto":
-            return engine != "plain" if self._compiled is None else self._compiled
+        if self._compiled is not None:
+            return self._compiled
+        if (engine := usual()) in ("compiled", "plain"):
+            return engine == "compiled"
         key = type(rod.parameters), *map(type, rod.parameters)
         if key not in _PREPARED:
-            there = Kernels(first_step, self._scene, self.stages)
+            there = Kernels(engine, first_step, self._scene, self.stages)
             if not there:
                 return there
             _PREPARED.add(key)

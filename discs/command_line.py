@@ -64,9 +64,8 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
         "--want", metavar="NAME", nargs="+", default=[], help=f"record also {', '.join((*WANTS, *OFFERS))} (default: none)"
     )
     add_loads(p)
-    p.add_argument(
-        "--engine", choices=ENGINES, help="compiled; plain, NumPy and SciPy; auto, compiled if kernels are there (default: auto)"
-    )
+    said = "compiled; plain, NumPy and SciPy; ready, compiled if kernels are there; auto, which also compiles them (default: auto)"
+    p.add_argument("--engine", choices=ENGINES, help=said)
     add_saving(p)
 
 

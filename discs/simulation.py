@@ -17,7 +17,7 @@ from discs.kernels.background import usual
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.doubt import doubted
-from discs.running.engine import COMPILING, ENGINES, Overtaken, plain_because
+from discs.running.engine import ENGINES, WAITING, Overtaken, plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.progress import NO_BAR, Progress
 from discs.running.recording import Recording, Rows, kept_settings
@@ -66,9 +66,9 @@ def simulate(
         step are found first, by runs of at most 101 frames in memory; a run that continues takes them from its file.
     engine : "compiled", which waits until kernels are compiled, once on a machine; "plain" for NumPy and SciPy; "auto", the
         default: compiled if the kernels are there, otherwise plain while they are compiled in the background, and compiled from the
-        start as soon as they are there. Both agree up to rounding (with step control to the tolerance). `stats["engine"]` tells
-        which it was and `stats["plain_because"]` why a run is plain. With a checkpoint "auto" is "compiled". The environment
-        variable DISCS_ENGINE names another default.
+        start as soon as they are there; "ready", the same, but nothing is compiled. Both agree up to rounding (with step control to
+        the tolerance). `stats["engine"]` tells which it was and `stats["plain_because"]` why a run is plain. With a checkpoint
+        "auto" is "compiled". The environment variable DISCS_ENGINE names another default.
 
     Returns
     -------
@@ -182,9 +182,10 @@ def _once(
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
     stepwise = isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
     recorded = (stepwise or integrator.runs_whole) and checkpoint is None and not want and system.load is None
-    there = kernels(problem, integrator, h, asked=not recorded) if engine == "auto" and not because else True
+    waits = engine in ("auto", "ready") and not because
+    there = kernels(engine, problem, integrator, h, asked=not recorded) if waits else True
     if not there:
-        because = COMPILING
+        because = WAITING
     about: Stats = {
         "method": integrator.name,
         "order": integrator.order,
@@ -213,7 +214,7 @@ def _once(
             before, rest = steps_before(float(times[f]), h)
             while march.step < before:
                 march.on(before)
-                if because == COMPILING and there:
+                if because == WAITING and there:
                     raise Overtaken
                 if shown is not None:
                     shown.update(march.step)

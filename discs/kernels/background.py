@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from discs.kernels.compiled import NotReady, readily
@@ -64,8 +65,8 @@ class _Compiler:
 COMPILER = _Compiler()
 
 
-def missing(prepare: Callable[..., object], *arguments: Any) -> bool:
-    """Whether kernels that prepare(*arguments) calls are missing; they are then compiled in the background.
+def missing(prepare: Callable[..., object], *arguments: Any, compiles: bool = True) -> bool:
+    """Whether kernels that prepare(*arguments) calls are missing; they are then compiled in the background, if `compiles`.
 
     prepare is a function of a module, with arguments that can be pickled. If they cannot, in a worker process, and if the process
     has failed, nothing is missing: the caller waits for its kernels.
@@ -74,6 +75,8 @@ def missing(prepare: Callable[..., object], *arguments: Any) -> bool:
         with readily():
             prepare(*arguments)
     except NotReady:
+        if not compiles:
+            return True
         if multiprocessing.parent_process() is not None:
             return False
         try:
@@ -85,15 +88,18 @@ def missing(prepare: Callable[..., object], *arguments: Any) -> bool:
 
 
 class Kernels:
-    """True if the kernels that prepare(*arguments) calls are there; see `missing`. Until they are it looks again, once a second."""
+    """True if the kernels that prepare(*arguments) calls are there; see `missing`. Until they are it looks again, once a second.
 
-    def __init__(self, prepare: Callable[..., object], *arguments: Any) -> None:
-        self._call = prepare, *arguments
-        self._there, self._looked = not missing(*self._call), time.monotonic()
+    engine : "auto", which compiles them in the background, or "ready".
+    """
+
+    def __init__(self, engine: str, prepare: Callable[..., object], *arguments: Any) -> None:
+        self._missing = partial(missing, prepare, *arguments, compiles=engine == "auto")
+        self._there, self._looked = not self._missing(), time.monotonic()
 
     def __bool__(self) -> bool:
         if not self._there and time.monotonic() > self._looked + SECONDS:
-            self._there, self._looked = not missing(*self._call), time.monotonic()
+            self._there, self._looked = not self._missing(), time.monotonic()
         return self._there
 
 

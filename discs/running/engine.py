@@ -5,8 +5,8 @@ from discs.integrators import Integrator
 from discs.loads.own import OwnLoad
 from discs.problem import Problem
 
-ENGINES = ("auto", "compiled", "plain")
-COMPILING = "its kernels are being compiled in the background"
+ENGINES = ("auto", "ready", "compiled", "plain")
+WAITING = "its kernels are not compiled yet"
 
 
 class Overtaken(Exception):

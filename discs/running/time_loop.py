@@ -35,9 +35,9 @@ def _key(system: RollingDiscs, integrator: Integrator, asked: bool) -> tuple[obj
     return asked, type(integrator), type(chain), *map(type, chain or ())  # the types of the chain's laws and load too
 
 
-def kernels(problem: Problem, integrator: Integrator, h: float, asked: bool) -> Kernels | bool:
-    """Whether the kernels of a run are there; if not, they are being compiled in the background."""
-    return _key(problem.system, integrator, asked) in _PREPARED or Kernels(compile_kernels, problem, integrator, h, asked)
+def kernels(engine: str, problem: Problem, integrator: Integrator, h: float, asked: bool) -> Kernels | bool:
+    """Whether the kernels of a run are there. If not, with the engine "auto" they are being compiled in the background."""
+    return _key(problem.system, integrator, asked) in _PREPARED or Kernels(engine, compile_kernels, problem, integrator, h, asked)
 
 
 def compile_kernels(problem: Problem, integrator: Integrator, h: float, asked: bool) -> None:

@@ -44,7 +44,7 @@ def empty_cache(tmp_path, monkeypatch):
 def test_a_kernel_that_is_not_there_is_compiled_in_the_background(empty_cache, capfd):
     with readily(), pytest.raises(NotReady):
         doubled(1.5)
-    there = Kernels(prepare, 1.5)
+    there = Kernels("auto", prepare, 1.5)
     assert not there
     assert "compiling kernels in the background" in capfd.readouterr().err
     until = time.monotonic() + 60
@@ -53,6 +53,13 @@ def test_a_kernel_that_is_not_there_is_compiled_in_the_background(empty_cache, c
         time.sleep(0.1)
     assert doubled(1.5) == 3.0
     assert empty_cache.asked
+
+
+def test_ready_compiles_nothing(empty_cache):
+    assert not Kernels("ready", prepare, 1.5)
+    assert empty_cache.process is None
+    doubled(1.5)
+    assert Kernels("ready", prepare, 1.5)
 
 
 def test_a_worker_process_waits(empty_cache, monkeypatch):
@@ -102,7 +109,7 @@ def test_a_run_is_plain_until_kernels_are_there_and_then_compiled(kernels_come):
     run, plain = (simulate(problem, dt=0.05, engine=engine) for engine in (None, "plain"))
     np.testing.assert_array_equal(run.x, plain.x)
     assert run.stats["engine"] == "plain"
-    assert "background" in run.stats["plain_because"]
+    assert "not compiled yet" in run.stats["plain_because"]
     kernels_come(3)
     overtaken, waited = (simulate(problem, dt=0.05, engine=engine) for engine in ("auto", "compiled"))
     np.testing.assert_array_equal(overtaken.x, waited.x)
@@ -126,5 +133,5 @@ def test_prepared_kernels_are_not_looked_for_again(monkeypatch):
 
 def test_the_default_engine_is_checked(monkeypatch):
     monkeypatch.setenv(background.ENGINE, "fast")
-    with pytest.raises(ValueError, match="engine must be one of 'auto', 'compiled', 'plain'; got 'fast'"):
+    with pytest.raises(ValueError, match="engine must be one of 'auto', 'ready', 'compiled', 'plain'; got 'fast'"):
         simulate(uneven(9, Model("springs", "field"), seed=4), dt=0.05)
