@@ -20,11 +20,12 @@ from discs.running.doubt import doubted
 from discs.running.engine import ENGINES, WAITING, Overtaken, plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.progress import NO_BAR, Progress
+from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows, kept_settings
 from discs.running.stats import Stats, of_search
 from discs.running.step_error import Watch
 from discs.running.suggest import suggest_dt
-from discs.running.time_loop import March, kernels
+from discs.running.time_loop import March
 from discs.running.tolerance import USUAL, NotReached, some_of, to_tolerance
 from discs.solution import Solution
 from discs.warn import warn

@@ -1,20 +1,18 @@
 """The time loop: advances a run to each output time, plain or compiled, and stops it on failure."""
 
 import sys
-import warnings
 from typing import Any
 
 import numpy as np
 
-from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import FixedStep, Integrator, Work
 from discs.integrators.work import NO_LOOKS, NO_STOPS, Cut, Frame, Memory, Tally
-from discs.kernels.background import Kernels
 from discs.loads.motor import Held
 from discs.loads.shares import Shares
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.calls import heed_halt
+from discs.running.engine import PREPARED, kinds
 from discs.running.failure import SimulationError, blown_up, lost_heading
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.stats import Stats
@@ -23,28 +21,9 @@ from discs.skew import Phase, Placed
 from discs.warn import warn
 
 NOTICE = 2.0  # seconds of compiling after which a notice is printed; reading kernels from the cache does not count
-_PREPARED: set[tuple[object, ...]] = set()
 WATCHED = ("looks", "passed", "doubted", "defects", "places")  # attributes of a `Watch` that a restart needs
 CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown between calls, Ctrl-C is polled in every sweep
 TABLED = 20_000  # steps of one compiled call whose loads have tables of their signals
-
-
-def _key(system: RollingDiscs, integrator: Integrator, asked: bool) -> tuple[object, ...]:
-    """What the kernels of a run depend on. asked : whether frames are asked for, or recorded by steps."""
-    chain = integrator.twin_of(system, system.parameters) if isinstance(integrator, FixedStep) else system.parameters
-    return asked, type(integrator), type(chain), *map(type, chain or ())  # the types of the chain's laws and load too
-
-
-def kernels(engine: str, problem: Problem, integrator: Integrator, h: float, asked: bool) -> Kernels | bool:
-    """Whether the kernels of a run are there. If not, with the engine "auto" they are being compiled in the background."""
-    return _key(problem.system, integrator, asked) in _PREPARED or Kernels(engine, compile_kernels, problem, integrator, h, asked)
-
-
-def compile_kernels(problem: Problem, integrator: Integrator, h: float, asked: bool) -> None:
-    """Compile the kernels of a run, or read them from disc."""
-    album = None if asked else Album(problem.system, np.empty(0), h)
-    with warnings.catch_warnings(action="ignore"):  # about the problem: the run itself warns
-        March(problem, integrator, h, compiled=True, quiet=True, album=album)
 
 
 class March:
@@ -107,8 +86,8 @@ class March:
     def _prepare(self, quiet: bool) -> None:
         """Compile the kernels (once per machine) or read them from disc (once per process)."""
         asked = self.album is None  # for frames, by a kernel of its own
-        key = _key(self.system, self.integrator, asked)
-        if key in _PREPARED:
+        key = kinds(self.system, self.integrator, asked)
+        if key in PREPARED:
             return
         from discs.kernels.compiled import compiling, say_so
 
@@ -120,7 +99,7 @@ class March:
                 self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.bound, nothing)
             if asked:
                 self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
-        _PREPARED.add(key)
+        PREPARED.add(key)
 
     def whole(self) -> bool:
         """Take the whole run at once; False if the method cannot or the run fails, which then goes step by step."""

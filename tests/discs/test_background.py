@@ -12,7 +12,7 @@ from discs import simulate
 from discs.kernels import background, compiled
 from discs.kernels.background import Kernels, missing
 from discs.kernels.compiled import NotReady, kernel, readily
-from discs.running import time_loop
+from discs.running import ready
 from tests.conftest import Model, uneven
 
 
@@ -127,7 +127,7 @@ def test_a_field_goes_on_with_its_kernels(kernels_come):
 def test_prepared_kernels_are_not_looked_for_again(monkeypatch):
     problem = uneven(9, Model("springs", "field"), seed=4)
     simulate(problem, dt=0.05, engine="compiled")
-    monkeypatch.setattr(time_loop, "Kernels", None)
+    monkeypatch.setattr(ready, "Kernels", None)
     assert simulate(problem, dt=0.05, engine="auto").stats["engine"] == "compiled"
 
 

@@ -194,7 +194,7 @@ class Compiling(Midpoint):
 def test_compiling_is_announced_once(method, progress, monkeypatch, capsys):
     problem = uneven(5, Model("springs", "field"))
     simulate(problem, dt=0.5, frames=1, progress=False)  # all others are compiled
-    monkeypatch.setattr(time_loop, "_PREPARED", set())
+    monkeypatch.setattr(time_loop, "PREPARED", set())
     monkeypatch.setattr(time_loop, "NOTICE", 0.01)
     for _ in range(2):
         simulate(problem, method, 0.5, 1, progress=progress)
