@@ -61,6 +61,8 @@ def loads() -> Figure:
         left.set_title(title)
         right.plot(run.t, run.energy, color=BLUE, label="energy")
         right.plot(run.t, getattr(run, name), "--", color=ORANGE, label=words)
+        if name == "dissipated":
+            right.plot(run.t, run.energy + run.dissipated, ":", color=INK, label="their sum")
         right.set(xlabel="t", title="the balance")
         right.legend()
     return figure
