@@ -94,7 +94,9 @@ def balances(
         raise ValueError(f"balances need a Rod with curvature='linear'; got {rod!r}")
     scene = run.stats.get("scene")
     if (run.problem is not None and run.problem.loads) or (isinstance(scene, dict) and scene.get("loads")):
-        raise ValueError("balances are those of a rod without loads; got a run with some")
+        raise ValueError(
+            "balances are those of a rod without loads; got a run with some: run.work and run.dissipated balance the energy"
+        )
     frames, nodes = run.x.shape
     if frames < 3 or nodes <= DEGREE:
         raise ValueError(f"balances need at least 3 frames and {DEGREE + 1} nodes; got {frames} and {nodes}")

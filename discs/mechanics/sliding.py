@@ -52,7 +52,9 @@ def slide(problem: Problem, epsilon: float, frames: int | ArrayLike = 101, rtol:
     """
     chain = problem.chain
     if not isinstance(chain, Chain) or not problem.system.quadratic or problem.loads:
-        raise ValueError("slide takes discs whose headings follow the line, with linear curvature and without loads")
+        need = "slide takes discs whose headings follow the line, with linear curvature and without loads"
+        cure = "take replace(problem, loads=())" if problem.loads else 'take a Chain with curvature="linear"'
+        raise ValueError(f"{need}; got {checks.shown(problem.loads or chain)}: {cure}")
     epsilon, rtol = checks.number("epsilon", epsilon, positive=True), checks.number("rtol", rtol, positive=True)
     times, started = frame_times(frames, problem.duration), clock.perf_counter()
     ground, n = Ground(problem, epsilon), chain.n
