@@ -9,7 +9,7 @@ import numpy as np
 from discs.arrays import Float
 from discs.files import schema
 from discs.problem import Problem
-from discs.running.part import Block
+from discs.running.outcome import Block
 from discs.solution import Solution
 
 if TYPE_CHECKING:

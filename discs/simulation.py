@@ -22,11 +22,11 @@ from discs.running.frames import ROUNDING, frame_times, observed, steps_before, 
 from discs.running.progress import NO_BAR, Progress
 from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows, kept_settings
-from discs.running.stats import Stats, of_search
+from discs.running.stats import Stats, begun, of_search
 from discs.running.step_error import Watch
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
-from discs.running.tolerance import USUAL, NotReached, some_of, to_tolerance
+from discs.running.tolerance import answered, search_with_doubt, some_of
 from discs.solution import Solution
 from discs.warn import warn
 
@@ -116,23 +116,23 @@ def _search(
         return _run(problem, integrator, dt, times, want, progress, engine, None, False)
 
     want = wanted(want, () if method == "auto" else find(method).offers)
-    times, doubt = frame_times(frames, problem.duration), ""
+    times = frame_times(frames, problem.duration)
     kept = None if checkpoint is None else kept_settings(checkpoint, tol)
     if kept is not None:
         integrator, dt, searched = kept
         return _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched), ""
     looked_at = times if checkpoint is None else some_of(times)
-    try:
-        found = to_tolerance(problem, method, USUAL if tol is None else tol, looked_at, run, want)
-    except NotReached as error:
-        if tol is not None or method != "auto":
-            raise
-        found, doubt = error.best, f"{error.message}: this is the last run"
+    found, doubt = answered(search_with_doubt(problem, method, tol, looked_at, want), run)
     if checkpoint is not None:
         integrator, dt = from_settings(found.stats["settings"]), found.stats["dt"]
         searched, known = of_search(found.stats), found.error_estimate
         found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched, known)
     return found, doubt
+
+
+def run_fixed(problem: Problem, integrator: Integrator, dt: float, times: Float) -> Solution:
+    """A run for a search: equal steps, frames at these times, (F,), and no estimate of the error of the steps."""
+    return _run(problem, integrator, dt, times, (), False, "compiled", None, False)
 
 
 def _run(*arguments: Any) -> Solution:
@@ -187,16 +187,7 @@ def _once(
     there = kernels(engine, problem, integrator, h, asked=not recorded) if waits else True
     if not there:
         because = WAITING
-    about: Stats = {
-        "method": integrator.name,
-        "order": integrator.order,
-        "settings": integrator.settings,
-        "engine": "plain" if because else "compiled",
-        "want": list(want),
-        "dt": h,
-        "dt_suggested": suggested,
-    }
-    about |= (more or {}) | (Stats(plain_because=because) if because else {})
+    about = begun(integrator, because, want, h, suggested) | (more or {})
     record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about, estimate)
     steps, rest = steps_before(end, h)
     shown = Progress(integrator.name, steps) if progress else None

@@ -81,7 +81,7 @@ def gathered(tension: Float, ends: str) -> Float:
     return own
 
 
-def slopes(d: Float, k: float, ends: str) -> Float:
+def slopes(d: Float, k: float | Float, ends: str) -> Float:
     """Headings r' at the discs from the links, (..., n_links) -> (..., n).
 
     r'_i = (r_{i+1} - r_{i-1})/2k, at the ends with the ghost discs. That is, at an end,

@@ -155,21 +155,36 @@ class FixedStep(Integrator):
         Stops after a step whose kinetic energy exceeds `bound`, and after one in which a disc loses its heading; the returned
         state is then undefined. Ctrl-C is polled in every sweep; `Cut` is raised if Python's handler of it does not raise.
         """
-        import discs.kernels.driver as driver
-
         if system.load is not None and not system.load.conservative:
             starts = t + h * np.arange(steps + 1.0)
             times = np.add.outer(starts, h * np.array([0.0, *self.parameters.nodes]))
             chain = chain._replace(load=system.load.timed(times.ravel(), abs(h)))
         state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta (n,) are (1, n) in compiled code
-        found = driver.march(self.parameters, self.twin_of(system, chain), state, t, h, steps, bound, *looks, *stops)
-        tally = Tally(*found)
+        tally = self.steps(self.twin_of(system, chain), state, t, h, steps, bound, looks, stops)
         if system.load is not None and not system.load.conservative:
             tally = tally._replace(spent=chain.load.spent)
+        return state if memory[-1].ndim == 2 else Phase(state.hi, state.lo, state.pi[0]), tally
+
+    @final
+    def steps(
+        self,
+        chain: Parameters,
+        state: Memory,
+        t: float,
+        h: float,
+        steps: int,
+        bound: float,
+        looks: Looks = NO_LOOKS,
+        stops: Stops = NO_STOPS,
+    ) -> Tally:
+        """Compiled steps from a state of the types of compiled code, in place. `Cut` as for `march`."""
+        import discs.kernels.driver as driver
+
+        tally = Tally(*driver.march(self.parameters, chain, state, t, h, steps, bound, *looks, *stops))
         if tally.steps < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut
-        return state if memory[-1].ndim == 2 else Phase(state.hi, state.lo, state.pi[0]), tally
+        return tally
 
 
 class OneStep(FixedStep):

@@ -1,7 +1,7 @@
 """`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it.
 
 With `--tested` those that the short suite runs: of the unit law and of discs with own headings not the explicit methods with fixed
-steps, and in lanes not the Gauss methods of the unit law.
+steps, in lanes not the Gauss methods of the unit law, and of chains side by side only the midpoint method with the field law.
 """
 
 import argparse
@@ -14,6 +14,7 @@ from discs.chains.rolling import ROLLING
 from discs.integrators import METHODS, FixedStep, Integrator
 from discs.kernels.slaved_lanes import MANY
 from discs.problem import Problem, State
+from discs.running.ensemble import simulate_many
 from discs.simulation import simulate
 
 ONES = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius")
@@ -56,12 +57,16 @@ def compile_for(law: str, tested: bool) -> None:
                 continue
             if n == MANY and tested and law != "field" and first.name != "midpoint":
                 continue
+            in_lanes = n != MANY and not steered and isinstance(first, FixedStep) and first.in_lanes
+            if in_lanes and (not tested or (law, first.name) == ("field", "midpoint")):
+                simulate_many([problem] * 3, first, 0.005, threads=1, progress=False)
+                print(f"{words}, side by side: {', '.join(method.name for method in methods)} compiled", flush=True)
             simulate(problem, first, 0.005, frames=1, progress=False, engine="compiled")
             simulate(
                 problem, first, 0.005, frames=1, want="velocity", progress=False, engine="compiled"
             )  # frames asked for have kernels of their own
-            in_lanes = ", in lanes" if n == MANY else ""
-            print(f"{words}{in_lanes}: {', '.join(method.name for method in methods)} compiled", flush=True)
+            how = ", in lanes" if n == MANY else ""
+            print(f"{words}{how}: {', '.join(method.name for method in methods)} compiled", flush=True)
 
 
 if __name__ == "__main__":

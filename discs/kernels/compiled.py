@@ -85,25 +85,26 @@ def stub(function: Callable[..., Any]) -> Any:
     return singledispatch(missing)
 
 
-def fill(of: Any, kind: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Give a stub its form for one kind of parameters, a NamedTuple; with `object`, for all kinds that have none of their own."""
+def fill(of: Any, *kinds: type, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a stub its form for some kinds of parameters, NamedTuples; with `object`, for all kinds that have none of their own."""
 
     def register(function: Callable[..., Any]) -> Callable[..., Any]:
         _MODULES[function.__module__] = function.__globals__
-        _FORMS.setdefault(kind, set()).add(function.__module__)
 
         def tell() -> None:
             from numba.extending import overload
 
             def choose(first: Any, *rest: Any) -> Any:
                 given = getattr(first, "instance_class", None)
-                return function if (given if given in of.registry else object) is kind else None
+                return function if (given if given in of.registry else object) in kinds else None
 
             choose.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]  # numba asks for the same one
             overload(of, jit_options=PART | options)(choose)
 
         later(tell)
-        of.register(kind, function)
+        for kind in kinds:
+            _FORMS.setdefault(kind, set()).add(function.__module__)
+            of.register(kind, function)
         return function
 
     return register

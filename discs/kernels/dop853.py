@@ -71,7 +71,7 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
     rate(chain, work, t, now, c, still, k, 0)
     do.lost(chain, work, slope)
     if times.size and times[0] == 0.0:
-        told[0, 0], told[1, 0] = do.frame(chain, work, Phase(now.q, still, now.p), c, v, q[:, 0], rates[:, 0])
+        do.frame(chain, work, Phase(now.q, still, now.p), c, v, q[:, 0], rates[:, 0], told[:, 0])
         done = 1
     if done < times.size:
         h = first(chain, work, now, inside, c, still, k, rtol, atol, longest)
@@ -116,7 +116,8 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
             between(series.q, x, now.q, inside.q)
             between(series.p, x, now.p, inside.p)
             do.settle(chain, work, inside.q, still)
-            told[0, done], told[1, done] = do.frame(chain, work, Phase(inside.q, still, inside.p), c, v, q[:, done], rates[:, done])
+            place = Phase(inside.q, still, inside.p)
+            do.frame(chain, work, place, c, v, q[:, done], rates[:, done], told[:, done])
             done += 1
         t, now, then = end, then, now
         copy(k.q[STAGES], k.q[0])

@@ -7,7 +7,7 @@ the functions that steps call, in this folder.
 import numpy as np
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import kernel, part
+from discs.kernels.compiled import fill, kernel, part, stub
 from discs.kernels.interrupts import interrupted
 from discs.kernels.limits import TURNED
 from discs.kernels.shared import ahead, columns, disc_by_disc, forward, seen
@@ -94,7 +94,7 @@ def march(
             lost = max(lost, do.lost(chain, work, slope))
             unfit = moves and (lost >= 0 or new[2] > 0 or not do.kinetic(after, chain, h) <= bound)
             if not unfit:
-                told[0, framed], told[1, framed] = do.frame(chain, work, shown, basis, rate, q[:, framed], rates[:, framed])
+                do.frame(chain, work, shown, basis, rate, q[:, framed], rates[:, framed], told[:, framed])
                 gradients, solves, framed = gradients + new[0], solves + new[1], framed + 1
             for j in range(spent.size):
                 spent[j] = kept[j]
@@ -143,13 +143,17 @@ def add_up(chain, q, factor, total):
             to[i] += factor * x[do.place(chain, i)]
 
 
-@part
+@stub
 def judge(chain, start, end, place, defect):
     """The largest relative defect of a step; infinite if a heading turns by more than TURNED, as whole turns do not show.
 
     start, end : positions in the order of the chain. place : third differences, (rows, n); then positions at the `end` of the step.
     defect : (2, rows), defects and sizes, filled in.
     """
+
+
+@fill(judge, object)
+def _judge(chain, start, end, place, defect):
     worst = 0.0
     for row in range(end.shape[0]):
         off, size, turned, before, after, to = 0.0, 0.0, 0.0, start[row], end[row], place[row]

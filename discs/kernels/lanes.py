@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.kernels import blocks
-from discs.kernels.compiled import part
+from discs.kernels import blocks, orders
+from discs.kernels.compiled import fill, part
 from discs.kernels.steered_matrix import border, solve_border
 from discs.kernels.vectors import LANES, after, before, load, store
 
@@ -70,9 +70,8 @@ def order(n: int) -> Order:
     return Order(n, rows, first, j % rows * LANES + j // rows)
 
 
-@part(_nrt=True)
+@fill(orders.matrices, Order, _nrt=True)
 def matrices(order, g, count):
-    """Workspace for `count` matrices of zeros, real or complex as g."""
     n, kind, inner = LANES * order.rows, np.array([g]).dtype, np.ones(LANES)
     inner[0] = 0.0
     a, u, w, p, q = np.zeros((5, count, n), kind)
@@ -82,27 +81,50 @@ def matrices(order, g, count):
     return Matrix(a, u, w, p, q, lead, inner, corner, ends, d, o, columns, edge, rest)
 
 
-@part
+@fill(orders.pick, Matrix)
 def pick(m, j):
-    """One of the matrices of `matrices`."""
     lead, corner, ends, d, o, columns, edge = m.lead[j], m.corner[j], m.ends[j], m.d[j], m.o[j], m.columns[j], m.edge[j]
     return Matrix(m.a[j], m.u[j], m.w[j], m.p[j], m.q[j], lead, m.inner, corner, ends, d, o, columns, edge, m.rest[j])
 
 
-@part
-def join(order, ring, x):
-    """Fill in the rows -2, -1 and `rows`, `rows` + 1 of x (n' + 2 HALO,): the neighbours of each lane, beyond free ends 0.
+@fill(orders.previous, Order)
+def _previous(order, v):
+    return before(v)
 
-    On a ring the two entries before disc 0 too.
-    """
+
+@fill(orders.join, Order)
+def join(order, ring, x):
     end = HALO + LANES * order.rows
     for k in range(2):
         store(x, LANES * k, before(load(x, LANES * (order.rows + k))))
         store(x, end + LANES * k, after(load(x, HALO + LANES * k)))
         x[LANES * k], x[end + LANES * (k + 1) - 1] = 0.0, 0.0
-        if ring:
+        if ring:  # the two entries before disc 0 too
             x[LANES * (order.first + k)] = x[LANES * (order.rows + k) + LANES - 1]
             x[end + LANES * (k + 1) - 1] = x[HALO + order.places[k]]
+
+
+@fill(orders.wrap, Order)
+def _wrap(order, x):
+    for k in range(2):
+        i = LANES * (order.rows + k)
+        store(x, i, after(load(x, LANES * k)))
+        x[i + LANES - 1] = x[order.places[k]]
+
+
+@fill(orders.first_links, Order)
+def _first_links(order, ring, shift, x, e, to):
+    for i in range(0, LANES * (order.first + 1), LANES):
+        to[HALO + i] = 0.0
+    if ring:
+        i, end = LANES * order.first, x.size - 1
+        to[HALO + i] = (x[i] - x[end]) + (e[i] - e[end]) + shift
+
+
+@fill(orders.rejoin, Order)
+def _rejoin(order, base, move, to):
+    i = LANES * order.first
+    to[HALO + i] = base[HALO + i] + (move[i] - move[move.size - 1])
 
 
 @part
@@ -125,10 +147,9 @@ def eliminate_ends(order, m):
         a[e], u[ef], w[eg] = 1.0, 0.0, 0.0
 
 
-@part
-def factor(order, ring, corners, m):
-    """Factor a matrix, whose entries are a, u, w in the order of lanes and, on a ring, cross from the last disc to the first."""
-    if corners:
+@fill(orders.factor, Order)
+def factor(order, ring, ghosts, m):
+    if ghosts:
         eliminate_ends(order, m)
     a, u, w, lead, d, o, last = m.a, m.u, m.w, m.lead, m.d, m.o, LANES * (order.rows - 1)
     if ring:
@@ -172,12 +193,11 @@ def factor(order, ring, corners, m):
         blocks.factor(d, o, d.shape[1])
 
 
-@part
-def solve(order, ring, corners, m, b):
-    """Solve with the factors of `factor`, b (n',) in place."""
+@fill(orders.solve, Order)
+def solve(order, ring, ghosts, m, b):
     n, ends, one, other = order.n, m.ends, order.places[0], order.places[order.n - 1]
     first, last = b[one], b[other]
-    if corners:
+    if ghosts:
         b[one], b[other] = 0.0, 0.0
         for k in range(3):
             b[order.places[k + 1]] -= ends[0, k] * first
@@ -204,7 +224,7 @@ def solve(order, ring, corners, m, b):
         known = load(b, i) * load(m.a, i) - load(m.p, i) * p - load(m.q, i) * q
         x1, x2 = known - load(m.w, i) * x2 - load(m.u, i) * x1, x1
         store(b, i, x1)
-    if corners:
+    if ghosts:
         b[one], b[other] = ends[0, 3] * first, ends[1, 3] * last
         for k in range(3):
             b[one] -= ends[0, k] * b[order.places[k + 1]]

@@ -57,8 +57,8 @@ def gradient(chain, work, move, g):
 
 
 @stub
-def frame(chain, work, state, c, v, q, rates):
-    """Record a state, the base position: q (rows, n) and the `rates` of the rows from theta on; returns energy and largest slip.
+def frame(chain, work, state, c, v, q, rates, told):
+    """Record a state, the base position: q (rows, n), the `rates` of the rows from theta on, and energy and largest slip, `told`.
 
     c, v : workspace like positions.
     """

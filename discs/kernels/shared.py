@@ -205,12 +205,12 @@ def seen(chain, work, c, hi, lo, v, q):
 
 
 @fill(do.frame, object)
-def _frame(chain, work, state, c, v, q, rates):
+def _frame(chain, work, state, c, v, q, rates, told):
     do.rate(state, chain, work, c, 1.0, v)
     for row in range(rates.shape[0]):
         for i in range(rates.shape[1]):
             rates[row, i] = v[row + 2, i]
-    return seen(chain, work, c, state.hi, state.lo, v, q)
+    told[0], told[1] = seen(chain, work, c, state.hi, state.lo, v, q)
 
 
 @fill(do.bases, object)

@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
+from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill, part
-from discs.kernels.lanes import HALO, Matrix, Order, join, matrices, order, pick
+from discs.kernels.lanes import HALO, Order, order
 from discs.kernels.limits import LOST_HEADING
+from discs.kernels.orders import close_links, first_links, join, matrices, pick, previous, rejoin
 from discs.kernels.shared import disc_by_disc
 from discs.kernels.slaved import Slaved
 from discs.kernels.slaved_matrix import GHOST, RING
-from discs.kernels.vectors import LANES, after, before, load, store
+from discs.kernels.vectors import LANES, after, load, store
 from discs.skew import Phase
 
 MANY = 64  # discs from which lanes are used; they need rows of two discs behind `Order.first`
@@ -25,7 +27,10 @@ MOST = 100_000  # discs up to which they are: they take half as much memory agai
 
 
 class Laned(NamedTuple):
-    """Parameters of `Slaved` in lanes, (n',). bend, torsion : (n' + 2 HALO,). springs : (2,), bending of consistent ends."""
+    """Parameters of `Slaved` in lanes, (n',). bend, torsion : (n' + 2 HALO,). springs : (2,), bending of consistent ends.
+
+    length : (LANES,), the scale of x and y. half : (LANES,), 1/2k.
+    """
 
     order: Order
     radius: NDArray
@@ -37,11 +42,52 @@ class Laned(NamedTuple):
     corner: NDArray
     springs: NDArray
     scale: NDArray
+    length: NDArray
     shift: NDArray
-    k: float
+    half: NDArray
     ends: int
     rolling: Any
     load: Any
+
+
+class Bundle(NamedTuple):
+    """The same of LANES chains side by side (`discs.kernels.abreast`), of the same kind, number of discs and law.
+
+    springs, corner : (2 LANES,). shift : (3, LANES). scale : of the first chain; what converges is measured by `length`.
+    bound : (LANES,), blow-up threshold of the kinetic energy of each chain. spare : (LANES,), workspace.
+    """
+
+    order: Abreast
+    radius: NDArray
+    weights: NDArray
+    bend: NDArray
+    torsion: NDArray
+    hessian: NDArray
+    twist: NDArray
+    corner: NDArray
+    springs: NDArray
+    scale: NDArray
+    length: NDArray
+    shift: NDArray
+    half: NDArray
+    ends: int
+    rolling: Any
+    load: Any
+    bound: NDArray
+    spare: NDArray
+
+
+LANED = Laned, Bundle
+
+
+def apart(chain: Slaved) -> tuple[NDArray, NDArray, NDArray]:
+    """Bending inside, (n,), torsion (n + 1,), and the bending of consistent ends, (2,)."""
+    bend, torsion, springs = chain.links.bend.copy(), chain.links.torsion.copy(), np.zeros(2)
+    if chain.ends == GHOST:
+        springs[:], bend[[0, -1]] = bend[[0, -1]], 0.0
+    if chain.ends != RING:
+        torsion[[0, -1]] = 0.0
+    return bend, torsion, springs
 
 
 def arranged(chain: Slaved) -> Laned:
@@ -58,11 +104,7 @@ def arranged(chain: Slaved) -> Laned:
 
     weights = put(chain.weights)
     weights[2, weights[2] == 0.0] = 1.0  # what belongs to no disc
-    bend, springs, torsion = links.bend.copy(), np.zeros(2), links.torsion.copy()
-    if chain.ends == GHOST:
-        springs[:], bend[[0, -1]] = bend[[0, -1]], 0.0
-    if not ring:
-        torsion[[0, n]] = 0.0
+    bend, torsion, springs = apart(chain)
     return Laned(
         lanes,
         put(chain.radius),
@@ -74,8 +116,9 @@ def arranged(chain: Slaved) -> Laned:
         links.corner,
         springs,
         chain.scale,
+        np.full(LANES, chain.scale[0]),
         chain.shift,
-        chain.k,
+        np.full(LANES, 0.5 / chain.k),
         chain.ends,
         chain.rolling,
         chain.load,
@@ -85,7 +128,7 @@ def arranged(chain: Slaved) -> Laned:
 class Workspace(NamedTuple):
     """Workspace, (3, n' + 2 HALO): base, links of the base position; links, of a moved one; half, half a step. c : (3, n' + HALO).
 
-    b : (1, n'). spare : (LANES,). matrix : one of `lanes.matrices`.
+    b : (1, n'). spare : (LANES,). matrix : one of `orders.matrices`.
     """
 
     base: NDArray
@@ -94,22 +137,22 @@ class Workspace(NamedTuple):
     c: NDArray
     b: NDArray
     spare: NDArray
-    matrix: Matrix
+    matrix: Any
 
 
-@fill(do.workspace, Laned, _nrt=True)
+@fill(do.workspace, *LANED, _nrt=True)
 def _workspace(chain):
     n = chain.radius.size
     base, links, half = np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO))
     return Workspace(base, links, half, np.zeros((3, n + HALO)), np.zeros((1, n)), np.empty(LANES), matrices(chain.order, 1.0, 1))
 
 
-@fill(do.factors, Laned, _nrt=True)
+@fill(do.factors, *LANED, _nrt=True)
 def _factors(chain, g, count):
     return matrices(chain.order, g, count)
 
 
-@fill(do.pick, Laned)
+@fill(do.pick, *LANED)
 def _pick(chain, m, j):
     return pick(m, j)
 
@@ -137,48 +180,39 @@ def _leave(chain, own, state):
 
 
 @fill(do.frame, Laned)
-def _frame(chain, work, state, c, v, q, rates):
-    return 0.0, 0.0  # frames of discs in lanes are not recorded on the way: `simulate` asks for each
+def _frame(chain, work, state, c, v, q, rates, told):
+    pass  # frames of discs in lanes are not recorded on the way: `simulate` asks for each
 
 
-@fill(do.settle, Laned)
+@fill(do.settle, *LANED)
 def _settle(chain, work, hi, lo):
-    rows, first, ring = chain.order.rows, chain.order.first, chain.ends == RING
+    end, ring = LANES * (chain.order.rows - 1), chain.ends == RING
     for axis in range(3):
         x, e, to = hi[axis], lo[axis], work.base[axis]
-        last, lost = before(load(x, LANES * (rows - 1))), before(load(e, LANES * (rows - 1)))
+        last, lost = previous(chain.order, load(x, end)), previous(chain.order, load(e, end))
         for i in range(0, x.size, LANES):
             here, low = load(x, i), load(e, i)
             store(to, HALO + i, (here - last) + (low - lost))
             last, lost = here, low
-        for i in range(0, LANES * (first + 1), LANES):
-            to[HALO + i] = 0.0
-        if ring:
-            i, end = LANES * first, x.size - 1
-            to[HALO + i] = (x[i] - x[end]) + (e[i] - e[end]) + chain.shift[axis]
+        first_links(chain.order, ring, chain.shift[axis], x, e, to)
         join(chain.order, ring, to)
 
 
-@part
-def close_ends(chain, d):
-    """Set the links before the first disc and after the last one, and those before `Order.first`, whose headings are then those
-    of disc 0."""
-    rows, first = chain.order.rows, HALO + LANES * chain.order.first
-    last, end = HALO + LANES * rows - 1, HALO + LANES * rows
-    for axis in range(2):
-        x = d[axis]
-        store(x, end, after(load(x, HALO)))
-        second, third = x[HALO + chain.order.places[1]], x[HALO + chain.order.places[2]]
-        if chain.ends == RING:
-            x[end + LANES - 1] = x[first]
-        elif chain.ends == GHOST:
-            x[first] = 3 * (second - third) + x[HALO + chain.order.places[3]]
-            x[end + LANES - 1] = 3 * (x[last] - x[last - LANES]) + x[last - 2 * LANES]
-        else:
-            x[first] = 2 * second - third
-            x[end + LANES - 1] = 2 * x[last] - x[last - LANES]
-        for i in range(first - LANES, HALO - 1, -LANES):
-            x[i] = x[first] + second - x[i + LANES]
+@fill(close_links, Order)
+def _close_links(order, ends, x):
+    first, last, end = HALO + LANES * order.first, HALO + LANES * order.rows - 1, HALO + LANES * order.rows
+    store(x, end, after(load(x, HALO)))
+    second, third = x[HALO + order.places[1]], x[HALO + order.places[2]]
+    if ends == RING:
+        x[end + LANES - 1] = x[first]
+    elif ends == GHOST:
+        x[first] = 3 * (second - third) + x[HALO + order.places[3]]
+        x[end + LANES - 1] = 3 * (x[last] - x[last - LANES]) + x[last - 2 * LANES]
+    else:
+        x[first] = 2 * second - third
+        x[end + LANES - 1] = 2 * x[last] - x[last - LANES]
+    for i in range(first - LANES, HALO - 1, -LANES):
+        x[i] = x[first] + second - x[i + LANES]
 
 
 @part
@@ -186,34 +220,34 @@ def moved(chain, base, move, d):
     """d = the links (2, n' + 2 HALO) after a move."""
     for axis in range(2):
         x, from_, to = move[axis], base[axis], d[axis]
-        last = before(load(x, x.size - LANES))
+        last = previous(chain.order, load(x, x.size - LANES))
         for i in range(0, x.size, LANES):
             here = load(x, i)
             store(to, HALO + i, load(from_, HALO + i) + (here - last))
             last = here
         if chain.ends == RING:
-            i = LANES * chain.order.first
-            to[HALO + i] = from_[HALO + i] + (x[i] - x[x.size - 1])
-    close_ends(chain, d)
+            rejoin(chain.order, from_, x, to)
+        close_links(chain.order, chain.ends, to)
 
 
-@fill(do.spend, Laned)
+@fill(do.spend, *LANED)
 def _spend(chain, state, t, weight, move, v, scale):
     pass  # there are no loads
 
 
-@fill(do.vanishing, Laned)
+@fill(do.vanishing, *LANED)
 def _vanishing(chain):
     return do.vanishing(chain.rolling)
 
 
-@fill(do.lost, Laned)
+@fill(do.lost, *LANED)
 def _lost(chain, work, slope):
     disc = -1
     if not do.vanishing(chain.rolling):
         return disc
-    d, half, worst, rows = work.base, 0.5 / chain.k, LOST_HEADING**2, chain.order.rows
+    d, worst, rows = work.base, LOST_HEADING**2, chain.order.rows
     for lane in range(LANES):
+        half = chain.half[lane]
         for row in range(chain.order.first if lane == 0 else 0, rows):
             i = LANES * row + lane
             j = HALO + i

@@ -3,8 +3,9 @@
 
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
-from discs.kernels.lanes import HALO, pick, solve
-from discs.kernels.slaved_lanes import Laned, moved
+from discs.kernels.lanes import HALO
+from discs.kernels.orders import pick, solve
+from discs.kernels.slaved_lanes import LANED, moved
 from discs.kernels.slaved_matrix import GHOST, RING
 from discs.kernels.slaved_sweeps import frozen, pulled
 from discs.kernels.vectors import LANES, larger, largest, load, pair, store, zero
@@ -38,7 +39,7 @@ def mix(weights, h, parts, row, to, start):
         store(to, start + i, mixed(w, x, i))
 
 
-@fill(do.refine, Laned)
+@fill(do.refine, *LANED)
 def _refine(chain, work, method, room, before, h, sweep):
     rule, own, p, v, force, fresh = method.tableau, room.stages, room.p, room.v, room.force, room.moves
     a, n, stages, pi = rule.a, chain.radius.size, rule.b.size, before.pi[0]
@@ -59,7 +60,7 @@ def _refine(chain, work, method, room, before, h, sweep):
     return renewed(chain, work, own, h, p, force, v)
 
 
-@fill(do.finish, Laned)
+@fill(do.finish, *LANED)
 def _finish(chain, work, method, room, before, h):
     pass  # there are no loads
 
@@ -67,11 +68,11 @@ def _finish(chain, work, method, room, before, h):
 @part
 def changed(chain, rule, own, rest, force):
     """force = the change of the momenta of the stages."""
-    x, z, n, ring, corners = own.x[0], own.z[0], chain.radius.size, chain.ends == RING, chain.ends == GHOST
+    x, z, n, ring, ghosts = own.x[0], own.z[0], chain.radius.size, chain.ends == RING, chain.ends == GHOST
     force[:] = 0.0
     for e in range(rule.real.size):
         mix(rule.real_in[e], 1.0, rest, 0, x, 0)
-        solve(chain.order, ring, corners, pick(own.single, e), x)
+        solve(chain.order, ring, ghosts, pick(own.single, e), x)
         for k in range(rule.b.size):
             weight, to = rule.real_out[e, k], force[k, 0]
             for i in range(0, n, LANES):
@@ -80,7 +81,7 @@ def changed(chain, rule, own, rest, force):
         real, imag, parts = four(rule.pairs_in[e].real, 1.0), four(rule.pairs_in[e].imag, 1.0), rows(rest, 0)
         for i in range(0, n, LANES):
             store(z, i, pair(mixed(real, parts, i), mixed(imag, parts, i)))
-        solve(chain.order, ring, corners, pick(own.double, e), z)
+        solve(chain.order, ring, ghosts, pick(own.double, e), z)
         for k in range(rule.b.size):
             weight, to = rule.pairs_out[e, k], force[k, 0]
             for i in range(0, n, LANES):
@@ -91,7 +92,7 @@ def changed(chain, rule, own, rest, force):
 @part
 def renewed(chain, work, own, h, p, change, v):
     """p += change, v = C p at each stage; returns the largest move by the change, in units of the scale."""
-    half, scale, spare, far_x, far_y, far = 0.5 * h, chain.scale, work.spare, zero(), zero(), zero()
+    half, far_x, far_y, far = 0.5 * h, zero(), zero(), zero()
     x, y, theta = own.common[0], own.common[1], own.common[2]
     for k in range(p.shape[0]):
         q, dq, cx, cy, ct, vx, vy, vt = p[k, 0], change[k, 0], own.c[k, 0], own.c[k, 1], own.c[k, 2], v[k, 0], v[k, 1], v[k, 2]
@@ -104,4 +105,4 @@ def renewed(chain, work, own, h, p, change, v):
             store(vx, i, load(cx, i) * r)
             store(vy, i, load(cy, i) * r)
             store(vt, i, load(ct, i) * r)
-    return max(largest(far_x, spare) / scale[0], largest(far_y, spare) / scale[1], largest(far, spare) / scale[2])
+    return max(largest(larger(far_x, far_y) / load(chain.length, 0), work.spare), largest(far, work.spare))

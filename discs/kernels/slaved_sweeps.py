@@ -6,25 +6,25 @@ Ghost links at free ends serve headings only; the springs of consistent ends act
 import numpy as np
 
 from discs.kernels import protocol as do
+from discs.kernels.abreast import END
 from discs.kernels.compiled import fill, part
-from discs.kernels.lanes import HALO, factor, join, pick, solve
-from discs.kernels.slaved_lanes import Laned, moved
+from discs.kernels.lanes import HALO, Order
+from discs.kernels.orders import corners, factor, join, pick, pull_ends, solve, wrap
+from discs.kernels.slaved_lanes import LANED, moved
 from discs.kernels.slaved_matrix import GHOST, RING
-from discs.kernels.vectors import LANES, after, larger, largest, load, store, zero
-
-END = 2.0, -5.0, 4.0, -1.0  # r_-1 - 2 r_0 + r_1 with the ghost disc r_-1 of a consistent end, by its first four discs
+from discs.kernels.vectors import LANES, larger, largest, load, store, zero
 
 
 @part
 def contact(chain, i, x, y):
     """C of the discs i ... i + LANES - 1, for the sums of their two links."""
-    a, b, e, square = do.contact(chain.rolling, load(chain.radius, i), 0.5 / chain.k, x, y)
+    a, b, e, square = do.contact(chain.rolling, load(chain.radius, i), load(chain.half, 0), x, y)
     t = 1.0 / np.sqrt(load(chain.weights[2], i) + load(chain.weights[0], i) * square)
     e = e * t
     return -b * e, a * e, t
 
 
-@fill(do.basis, Laned)
+@fill(do.basis, *LANED)
 def _basis(chain, work, move, c):
     moved(chain, work.base, move, work.links)
     (dx, dy, _), (cx, cy, ct) = work.links, c
@@ -93,36 +93,39 @@ def pulled(chain, work, c, g):
     for i in range(chain.order.first):
         g[LANES * i] = 0.0
     if chain.ends == GHOST:
-        pull_ends(chain, work, c, g)
+        pull_ends(chain.order, chain.springs, base, half, c, g)
 
 
-@part
-def pull_ends(chain, work, c, g):
-    """Add the forces of the bending springs of consistent ends to g."""
-    base, half, last = work.base, work.half, chain.order.n - 1
+@fill(pull_ends, Order)
+def _pull_ends(order, springs, base, half, c, g):
+    last = order.n - 1
     for end in range(2):
         for axis in range(2):
             moment = 0.0
             for k, share in enumerate((-2.0, 3.0, -1.0)):  # of the three links from the end inwards
-                i = HALO + chain.order.places[k + 1 if end == 0 else last - k]
-                j = HALO + chain.order.places[k if end == 0 else last - k - 1]
+                i = HALO + order.places[k + 1 if end == 0 else last - k]
+                j = HALO + order.places[k if end == 0 else last - k - 1]
                 moment += share * (base[axis, i] + (half[axis, i] - half[axis, j]))
             for k, share in enumerate(END):
-                i = chain.order.places[k if end == 0 else last - k]
-                g[i] += c[axis, i] * (share if end == 0 else -share) * chain.springs[end] * moment
+                i = order.places[k if end == 0 else last - k]
+                g[i] += c[axis, i] * (share if end == 0 else -share) * springs[end] * moment
+
+
+@fill(corners, Order)
+def _corners(order, given, g, c, to):
+    for end in range(2):
+        i, j = order.places[0 if end == 0 else order.n - 4], order.places[3 if end == 0 else order.n - 1]
+        to[end] = g * (given[end] * (c[0, i] * c[0, j] + c[1, i] * c[1, j]))
 
 
 @part
 def assemble(chain, c, one, g, m):
     """Entries of `one` I + g C^T (grad^2 V) C; fills in the last two rows of c, (3, n' + HALO)."""
-    lanes, a, u, w, n = chain.order, m.a, m.u, m.w, m.a.size
+    a, u, w, n = m.a, m.u, m.w, m.a.size
     s0, s1, s2, t0, t1 = chain.hessian[0], chain.hessian[1], chain.hessian[2], chain.twist[0], chain.twist[1]
     cx, cy, ct = c[0], c[1], c[2]
     for axis in range(3):
-        x = c[axis]
-        for k in range(2):
-            store(x, n + LANES * k, after(load(x, LANES * k)))
-            x[n + LANES * (k + 1) - 1] = x[lanes.places[k]]
+        wrap(chain.order, c[axis])
     x, y, t, x1, y1, t1_ = load(cx, 0), load(cy, 0), load(ct, 0), load(cx, LANES), load(cy, LANES), load(ct, LANES)
     for i in range(0, n, LANES):
         x2, y2, t2 = load(cx, i + HALO), load(cy, i + HALO), load(ct, i + HALO)
@@ -131,12 +134,10 @@ def assemble(chain, c, one, g, m):
         store(w, i, g * (load(s2, i) * (x * x2 + y * y2)))
         x, y, t, x1, y1, t1_ = x1, y1, t1_, x2, y2, t2
     if chain.ends == GHOST:
-        for end in range(2):
-            i, j = lanes.places[0 if end == 0 else lanes.n - 4], lanes.places[3 if end == 0 else lanes.n - 1]
-            m.corner[end] = g * (chain.corner[end] * (cx[i] * cx[j] + cy[i] * cy[j]))
+        corners(chain.order, chain.corner, g, c, m.corner)
 
 
-@fill(do.sweep, Laned)
+@fill(do.sweep, *LANED)
 def _sweep(chain, work, state, t, h, p, move, first):
     c, q, b, half, start = work.c, p[0], work.b[0], 0.5 * h, state.pi[0]
     moved(chain, work.base, move, work.links)
@@ -161,11 +162,10 @@ def _sweep(chain, work, state, t, h, p, move, first):
         store(x, i, new_x)
         store(y, i, new_y)
         store(theta, i, new)
-    scale, spare = chain.scale, work.spare
-    return max(largest(far_x, spare) / scale[0], largest(far_y, spare) / scale[1], largest(far, spare) / scale[2])
+    return max(largest(larger(far_x, far_y) / load(chain.length, 0), work.spare), largest(far, work.spare))
 
 
-@fill(do.pullback, Laned)
+@fill(do.pullback, *LANED)
 def _pullback(chain, work, state, t, move, c, p, g):
     for axis in range(3):
         x, to = move[axis], work.half[axis]
@@ -174,7 +174,7 @@ def _pullback(chain, work, state, t, move, c, p, g):
     pulled(chain, work, c, g[0])
 
 
-@fill(do.stiffness, Laned)
+@fill(do.stiffness, *LANED)
 def _stiffness(chain, work, move, c, matrix):
     for axis in range(3):
         for i in range(0, matrix.a.size, LANES):
@@ -182,16 +182,17 @@ def _stiffness(chain, work, move, c, matrix):
     assemble(chain, work.c, 0.0, 1.0, matrix)
 
 
-@fill(do.precondition, Laned)
+@fill(do.precondition, *LANED)
 def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
     for i in range(stiff.a.size):
         matrix.a[i] = 1 + g * stiff.a[i]
         matrix.u[i] = g * stiff.u[i]
         matrix.w[i] = g * stiff.w[i]
-    matrix.corner[0], matrix.corner[1] = g * stiff.corner[0], g * stiff.corner[1]
+    for i in range(stiff.corner.size):
+        matrix.corner[i] = g * stiff.corner[i]
     factor(chain.order, chain.ends == RING, chain.ends == GHOST, matrix)
 
 
-@fill(do.correct, Laned)
+@fill(do.correct, *LANED)
 def _correct(chain, matrix, r):
     solve(chain.order, chain.ends == RING, chain.ends == GHOST, matrix, r[0])

@@ -4,9 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from discs.arrays import Float
+from discs.arrays import Float, Int
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.work import Stops
+
+
+def all_steps_before(times: Float, h: float) -> tuple[Int, Float]:
+    """The whole steps before each time, and the time from there, (F,); as `discs.running.frames.steps_before`."""
+    steps = (times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
+    rests = times - steps * h
+    return steps, np.where(rests > 1e-9 * h, rests, 0.0)
 
 
 class Album:
@@ -26,9 +33,7 @@ class Album:
     def __init__(self, system: RollingDiscs, times: Float, h: float) -> None:
         self.times = times
         self.names = *system.rows, *system.rates[2:], "energy", "rolling_residual"
-        self.steps = (times / h * (1 + 4e-16) + 1e-9).astype(np.int64)  # as `steps_before`
-        rests = times - self.steps * h
-        self.rests: Float = np.where(rests > 1e-9 * h, rests, 0.0)
+        self.steps, self.rests = all_steps_before(times, h)
         rows, n, self.done = len(system.rows), system.n, 0
         self.q, self.told = np.empty((rows, times.size, n)), np.empty((2, times.size))
         self.rates = np.empty((rows - 2, times.size, n))

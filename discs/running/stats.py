@@ -1,6 +1,9 @@
 """`Solution.stats`: settings, cost and error estimates of a run."""
 
+from collections.abc import Sequence
 from typing import Any, TypedDict, cast
+
+from discs.integrators import Integrator
 
 
 class Stats(TypedDict, total=False):
@@ -43,6 +46,20 @@ class Stats(TypedDict, total=False):
     elements: int
     nodes: int
     radius: float
+
+
+def begun(integrator: Integrator, because: str, want: Sequence[str], dt: float, suggested: bool) -> Stats:
+    """The entries of stats that are known at the start of a run. because : why it is plain; empty if it is compiled."""
+    found: Stats = {
+        "method": integrator.name,
+        "order": integrator.order,
+        "settings": integrator.settings,
+        "engine": "plain" if because else "compiled",
+        "want": list(want),
+        "dt": dt,
+        "dt_suggested": suggested,
+    }
+    return found | (Stats(plain_because=because) if because else {})
 
 
 def of_search(stats: Stats) -> Stats:

@@ -106,25 +106,14 @@ class Watch:
 
     def estimate(self) -> float:
         """The estimate from the looks done so far."""
-        if not self.passed:
-            return 0.0
-        mean = np.add.reduce(self.defects[: self.passed, 0]) / self.passed
-        return float(np.maximum.reduce(mean / self._sizes())) * SAFETY * (self.steps or 1)
-
-    def _sizes(self) -> Float:
-        """What errors are relative to, (rows,)."""
-        size: Float = np.maximum.reduce(self.defects[: self.passed, 1])
-        for kind in (slice(0, 2), slice(2, None)):
-            size[kind] = np.maximum(size[kind], LEAST * np.maximum.reduce(size[kind]))
-        size[size == 0] = 1.0
-        return size
+        return float(estimated(self.defects[: self.passed], self.steps)) if self.passed else 0.0
 
     def again(
         self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: Float, h: float, parameters: Parameters
     ) -> float | None:
         """The error against a run with half the step, at the positions kept and at the `last` ones; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
-        size = self._sizes()
+        size = sizes(self.defects[: self.passed])
         steps = [*self.looks.tolist(), self.steps] if self.steps else []
         for step, place in zip(steps, [*self.places, last], strict=True):
             memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), parameters)
@@ -133,6 +122,22 @@ class Watch:
             done, off = step, np.abs(memory.hi - place).max(axis=1)
             worst = max(worst, float((off / size).max()))
         return 4 / 3 * worst
+
+
+def estimated(seen: Float, steps: int) -> Float:
+    """The estimate of a run of some steps, or of several runs, (...), from looks (m, 2, rows, ...) as in `Watch`."""
+    mean = np.add.reduce(seen[:, 0]) / len(seen)
+    found: Float = np.maximum.reduce(mean / sizes(seen)) * SAFETY * (steps or 1)
+    return found
+
+
+def sizes(seen: Float) -> Float:
+    """What errors are relative to, (rows, ...), from looks."""
+    size: Float = np.maximum.reduce(seen[:, 1])
+    for kind in (slice(0, 2), slice(2, None)):
+        size[kind] = np.maximum(size[kind], LEAST * np.maximum.reduce(size[kind]))
+    size[size == 0] = 1.0
+    return size
 
 
 def advanced(

@@ -26,8 +26,10 @@ The tolerance of sweeps is such that all steps together leave an error of SWEPT 
 those of docs/trust.md.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -53,11 +55,15 @@ RESOLVED = 1e-2  # relative error below which the effect of rounding is tested
 FINE = 1e-6  # tolerance below which the effect of rounding is tested early
 ENDED = 0.01  # |r'| of a disc one step before it loses its heading; if it is larger, the step is too long
 ATTEMPTS, FAILURES = 28, 16  # runs at most, and failures among them
+COARSE = 4  # steps to a factor of two that searches side by side choose from: more runs then have the same step
 
 WANTED = {"velocity": ("x_rate", "y_rate"), "slope": ("slope_x", "slope_y"), "contact_force": ("contact_force",)}
 LADDER = Midpoint(), Gauss6(), Gauss8()  # the methods of "auto", in this order
 
+Request = tuple[Problem, Integrator, float, Float]  # a run: problem, method, step, times of frames
 Run = Callable[[Problem, Integrator, float, Float], Solution]
+Found = TypeVar("Found")
+Search = Generator[Request, Solution, Found]  # asks for runs and is sent them, or thrown their `SimulationError`
 
 
 def names(problem: Problem, want: Iterable[str] = ()) -> tuple[str, ...]:
@@ -84,6 +90,51 @@ def to_tolerance(
     run: Run,
     want: Iterable[str] = (),
 ) -> Solution:
+    """The run that `search` finds. run : (problem, integrator, dt, times) -> Solution."""
+    return answered(search(problem, method, tol, times, want), run)
+
+
+def answered(asking: Search[Found], run: Run) -> Found:
+    """The result of a search whose runs are made one after the other."""
+    reply: Callable[[], Request] = partial(next, asking)
+    while True:
+        try:
+            request = reply()
+        except StopIteration as done:
+            found: Found = done.value
+            return found
+        try:
+            reply = partial(asking.send, run(*request))
+        except SimulationError as error:
+            reply = partial(asking.throw, error)
+
+
+def search_with_doubt(
+    problem: Problem,
+    method: str | Integrator,
+    tol: float | Mapping[str, float] | None,
+    times: Float,
+    want: Iterable[str] = (),
+    coarse: bool = False,
+) -> Search[tuple[Solution, str]]:
+    """As `search`, and a warning or "". With "auto" and without a tolerance the last run is the result even if `USUAL` was not
+    reached, with a warning."""
+    try:
+        return (yield from search(problem, method, USUAL if tol is None else tol, times, want, coarse)), ""
+    except NotReached as error:
+        if tol is not None or method != "auto":
+            raise
+        return error.best, f"{error.message}: this is the last run"
+
+
+def search(
+    problem: Problem,
+    method: str | Integrator,
+    tol: float | Mapping[str, float],
+    times: Float,
+    want: Iterable[str] = (),
+    coarse: bool = False,
+) -> Search[Solution]:
     """Run with shorter and shorter steps until the estimated error is within the tolerance; the algorithm is above.
 
     Parameters
@@ -92,8 +143,8 @@ def to_tolerance(
     tol : tolerance of the largest error over discs and frames, relative to the largest value, for x, y, theta (and phi) or for the
         quantities named.
     times : frames, (F,).
-    run : (problem, integrator, dt, times) -> Solution.
     want : further quantities to record.
+    coarse : choose steps and tolerances of sweeps from a few, the next ones that are not larger.
 
     Returns
     -------
@@ -110,7 +161,7 @@ def to_tolerance(
     bound = checks.tolerances(tol, names(problem, want), problem.system.rows, LEAST)
     integrator, *higher = methods_for(method, min(bound.values()))
     if not times[-1]:
-        start = run(problem, integrator, problem.duration / FEWEST, times)
+        start = yield problem, integrator, problem.duration / FEWEST, times
         return _told(start, dict.fromkeys(estimates.compared(start), 0.0), tol, 1, "fewest steps")
     end, some = float(times[-1]), some_of(times)
     steps = _fewest(problem, integrator, end)
@@ -120,9 +171,11 @@ def to_tolerance(
     looked, stalls, failures, best_yet = False, 0, 0, np.inf
     for attempt in range(1, ATTEMPTS + 1):
         dt = end / steps
-        sharp = _sharpened(integrator, isinstance(method, str), estimates.sweeps_to(problem, bound, size, dt, end))
+        swept = estimates.sweeps_to(problem, bound, size, dt, end)
+        sharp = _sharpened(integrator, isinstance(method, str), float(4.0 ** np.floor(0.5 * np.log2(swept))) if coarse else swept)
         try:
-            found, failure = run(problem, sharp, dt, some), None
+            found = yield problem, sharp, dt, some
+            failure = None
         except SimulationError as error:
             if failure and error.slope < ENDED and abs(error.time - failure.time) < 3 * dt:  # the last dt was twice that
                 raise
@@ -143,7 +196,8 @@ def to_tolerance(
         worst = _worst(errors, bound, size)
         if worst <= 1 and some.size < times.size:
             pair = (from_settings(longer.stats["settings"]), longer.stats["dt"]), (sharp, dt)
-            longer, shorter = (run(problem, settings, h, times) for settings, h in pair)
+            longer = yield problem, *pair[0], times
+            shorter = yield problem, *pair[1], times
             errors = estimates.errors(longer, shorter, order)
             worst = _worst(errors, bound, estimates.sizes(shorter, bound))
         left = _worst(estimates.unswept(longer), bound, size)
@@ -157,7 +211,8 @@ def to_tolerance(
         resolved = min(bound.values()) < FINE and not looked and max(errors[name] / size[name] for name in bound) < RESOLVED
         if resolved or (stalls and not higher):
             looked = True
-            floor = _worst(estimates.differences(found, run(estimates.nudged(problem), sharp, dt, found.t)), bound, size)
+            other = yield estimates.nudged(problem), sharp, dt, found.t
+            floor = _worst(estimates.differences(found, other), bound, size)
             if sharp.sweep_tolerance <= estimates.LEAST_SWEPT:
                 floor = max(floor, _worst(estimates.unswept(found), bound, size))  # sweeps that converged to rounding
             if floor > (1 if resolved else worst / 10):
@@ -168,7 +223,8 @@ def to_tolerance(
             continue
         least, most = GROWTH
         wanted = longer.stats["steps"] * (AIM * worst) ** (1 / (integrator.order if first else max(seen, 1.0)))
-        steps = int(np.ceil(np.clip(wanted, least * steps, most * steps)))
+        wanted = np.clip(wanted, least * steps, most * steps)
+        steps = int(np.ceil(2.0 ** (np.ceil(COARSE * np.log2(wanted)) / COARSE) if coarse else wanted))
     if len(runs) < 2:
         raise failure or SimulationError(f"steps do not converge, down to dt = {dt:g}; take another method", 0, 0.0, 0)
     raise NotReached(min(bound.values()), worst, best.stats["dt"], None, best)

@@ -134,7 +134,7 @@ def test_a_run_to_a_tolerance_goes_on_with_the_step_that_was_found(settled, tmp_
     problem, path = uneven(7, OPEN), tmp_path / "run.nc"
     settled = settled | {"frames": np.linspace(0.1, 0.9, 150)}
     stopped(monkeypatch, 9, problem, **settled, checkpoint=path)
-    monkeypatch.setattr("discs.simulation.to_tolerance", None)  # no search
+    monkeypatch.setattr("discs.simulation.search_with_doubt", None)  # no search
     run = simulate(problem, **settled, checkpoint=path, progress=False)
     equal(run, simulate(problem, **settled, checkpoint=path, progress=False))
     monkeypatch.undo()

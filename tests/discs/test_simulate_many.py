@@ -126,7 +126,9 @@ def test_a_checkpoint_goes_on_to_the_same_bits(tmp_path, monkeypatch):
     for kept in (4, 3, 2, 1):
         file.write_text("".join(lines[:kept]) + lines[-1][:30] * (kept < 4))
         called = []
-        monkeypatch.setattr(ensemble, "run_part", lambda *args, called=called: [called.append(args[0]), part.run_part(*args)][1])
+        monkeypatch.setattr(
+            ensemble, "run_part", lambda *args, called=called: [called.append(args[0].numbers), part.run_part(*args)][1]
+        )
         with pytest.warns(UserWarning, match="1 of 19 runs failed, as run 3: the run blew up"):
             again = simulate_many(problems, **arguments)
         assert len(called) == 4 - kept

@@ -1,0 +1,69 @@
+"""What an order of discs in lanes fills in: `discs.kernels.lanes`, one chain, and `discs.kernels.abreast`, several.
+
+Arrays of discs are (n',), n' = LANES rows; those with a halo have two more rows at both ends. `first` is the row of disc 0 in its
+lane. `ring` : whether the ends are joined. `ends` : as in `discs.kernels.slaved_matrix`.
+"""
+
+from discs.kernels.compiled import stub
+
+
+@stub
+def previous(order, v):
+    """What is before the first row of each lane, from the last row; beyond the ends of a chain it is not used."""
+
+
+@stub
+def join(order, ring, x):
+    """Fill in the rows -2, -1 and `rows`, `rows` + 1 of x (n' + 2 HALO,): the neighbours of each lane, beyond free ends 0."""
+
+
+@stub
+def wrap(order, x):
+    """Fill in the rows `rows` and `rows` + 1 of x (n' + HALO,) by what is next to each lane; free ends do not use them."""
+
+
+@stub
+def first_links(order, ring, shift, x, e, to):
+    """Correct the links `to` (n' + 2 HALO,) of positions x + e before the first disc: 0, or on a ring from the last one."""
+
+
+@stub
+def rejoin(order, base, move, to):
+    """The same of a ring's links after a move from links `base`."""
+
+
+@stub
+def close_links(order, ends, x):
+    """Set the links of x or y before the first disc and after the last one, and those before `first`, whose headings are then those
+    of disc 0."""
+
+
+@stub
+def pull_ends(order, springs, base, half, c, g):
+    """Add the forces of the bending springs of consistent ends, after the move `half` from the links `base`, to g (n',)."""
+
+
+@stub
+def corners(order, given, g, c, to):
+    """to = g C^T (given) C, entries of the discs 0 with 3 and n - 4 with n - 1."""
+
+
+@stub
+def matrices(order, g, count):
+    """Workspace for `count` matrices of zeros, real or complex as g."""
+
+
+@stub
+def pick(m, j):
+    """One of the matrices of `matrices`."""
+
+
+@stub
+def factor(order, ring, ghosts, m):
+    """Factor a matrix, whose entries are a, u, w and, for consistent ends (`ghosts`), corners; on a ring they cross from the last
+    disc to the first."""
+
+
+@stub
+def solve(order, ring, ghosts, m, b):
+    """Solve with the factors of `factor`, b (n',) in place."""
