@@ -27,7 +27,8 @@ from continuum.galerkin import SpectralRod
 from continuum.modes import Modes, Pencil
 from discs.arrays import Float
 from discs.integrators.collocated import Guide, collocate
-from discs.integrators.collocation import Collocation, tableau
+from discs.integrators.collocation import Collocation
+from discs.integrators.tableaux import tableau
 from discs.skew import Phase, add
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from continuum.galerkin import SpectralRod
 from discs.arrays import Float
-from discs.integrators.collocation import tableau
+from discs.integrators.tableaux import tableau
 from discs.skew import Phase
 
 

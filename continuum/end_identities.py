@@ -17,7 +17,7 @@ from continuum.galerkin import SpectralRod
 from continuum.initial import resolve
 from continuum.rod import Scene
 from discs.arrays import Complex, Float
-from discs.integrators.collocation import tableau
+from discs.integrators.tableaux import tableau
 from discs.skew import Phase
 
 BENT = 1e-6  # curvature times the length: beyond it an initial line violates the condition at the end

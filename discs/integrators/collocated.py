@@ -1,4 +1,4 @@
-"""Collocation methods in (q, pi); the coefficients and the compiled twin are in `discs.integrators.collocation`."""
+"""Collocation methods in (q, pi); the compiled twin is `discs.integrators.collocation`."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -10,7 +10,8 @@ import numpy as np
 from discs import checks
 from discs.arrays import Float
 from discs.integrators.base import OneStep
-from discs.integrators.collocation import Collocation, Tableau
+from discs.integrators.collocation import Collocation
+from discs.integrators.tableaux import Tableau
 from discs.integrators.work import Work
 from discs.skew import Load, Phase, SkewGradient, add
 

@@ -1,70 +1,17 @@
-"""Collocation at Gauss or Radau points: coefficients, and the compiled step; the plain twin is `discs.integrators.collocated`."""
+"""Collocation at Gauss or Radau points: the compiled step; the plain twin is `discs.integrators.collocated`."""
 
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from discs.arrays import Complex, Float
+from discs.integrators.tableaux import Tableau
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, part
 from discs.kernels.interrupts import interrupted
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import column, copy, forward, largest, renew, stuck, unsettled
 from discs.skew import Phase
-
-
-class Tableau(NamedTuple):
-    """Coefficients of an s-stage collocation method.
-
-    a, inverse : (s, s), and a^{-1}. b, nodes : (s,), weights, and places in [0, 1]. last : (s,), b^T a^{-1}, from the momenta of
-    stages to those at the end of the step.
-
-    a is diagonalised. real : its real eigenvalues (none or one). pairs : the complex ones with positive imaginary part, each for a
-    pair. real_in, pairs_in : (number, s), rows that project stages on the eigenvectors. real_out, pairs_out : (number, s), the
-    eigenvectors; those of pairs are doubled, in place of the conjugate ones.
-    """
-
-    a: Float
-    inverse: Float
-    b: Float
-    nodes: Float
-    last: Float
-    real: Float
-    real_in: Float
-    real_out: Float
-    pairs: Complex
-    pairs_in: Complex
-    pairs_out: Complex
-
-
-@cache
-def tableau(stages: int) -> Tableau:
-    """Gauss: collocation at the zeros of the Legendre polynomial P_s on [0, 1], of order 2 s."""
-    nodes, weights = np.polynomial.legendre.leggauss(stages)
-    return _collocation((nodes + 1) / 2, weights / 2)
-
-
-@cache
-def radau(stages: int) -> Tableau:
-    """Radau IIA: collocation at the zeros of P_s - P_{s-1} on [0, 1], of order 2 s - 1. The last stage is the end of the step."""
-    nodes = np.polynomial.legendre.legroots(np.eye(stages + 1)[-1] - np.eye(stages + 1)[-2])
-    c = (np.append(np.sort(nodes.real)[:-1], 1.0) + 1) / 2
-    return _collocation(c, None)._replace(last=np.eye(stages)[-1])
-
-
-def _collocation(c: Float, b: Float | None) -> Tableau:
-    """Collocation at c: sum_j a_ij c_j^m = c_i^(m+1)/(m+1) for m < s. Weights that are not given are those of the last stage."""
-    powers = np.arange(c.size)
-    a = (c[:, None] ** (powers + 1) / (powers + 1)) @ np.linalg.inv(c[:, None] ** powers)
-    b = a[-1].copy() if b is None else b
-    values, out = np.linalg.eig(a)
-    into = np.linalg.inv(out)
-    real, upper = np.abs(values.imag) < 1e-12, values.imag > 1e-12
-    last = np.linalg.solve(a.T, b).astype(float, copy=False)
-    of_real = values[real].real, into[real].real, out.T[real].real
-    of_pairs = values[upper].astype(complex), into[upper].astype(complex), 2 * out.T[upper].astype(complex)
-    return Tableau(a, np.linalg.inv(a), b, c, last, *(np.ascontiguousarray(x) for x in (*of_real, *of_pairs)))
 
 
 class Collocation(NamedTuple):

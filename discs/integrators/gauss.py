@@ -4,7 +4,7 @@ from abc import ABC
 from typing import ClassVar
 
 from discs.integrators.collocated import Collocated
-from discs.integrators.collocation import Tableau, tableau
+from discs.integrators.tableaux import Tableau, tableau
 
 
 class Gauss(Collocated, ABC):

@@ -9,8 +9,8 @@ import pytest
 from discs import Chain, Gauss8, Leapfrog, McLachlanPerlmutter, Midpoint, Problem, State, simulate
 from discs.integrators import METHODS, Integrator, Work, find
 from discs.integrators.collocated import Collocated
-from discs.integrators.collocation import tableau
 from discs.integrators.composition import Composition
+from discs.integrators.tableaux import tableau
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, models_and_engines, uneven
 from tests.discs.test_system import contact_from_the_definition
 
@@ -229,7 +229,7 @@ def test_fractions_of_compositions(name):
     np.testing.assert_array_equal(fractions, fractions[::-1])
 
 
-@pytest.mark.parametrize("stages", [2, 3, 4])
+@pytest.mark.parametrize("stages", [2, 3, 4, 12])
 def test_gauss_tableau(stages):
     """Collocation, the weights' exactness, M = 0 (energy), and the eigenvectors that solve the stages."""
     t = tableau(stages)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discs import Chain, Problem, State, simulate
-from discs.integrators.collocation import radau
+from discs.integrators.tableaux import radau
 from discs.loads import Damping, Motor, signals
 
 STAGES = {"radau3": 2, "radau5": 3}
