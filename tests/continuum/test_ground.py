@@ -228,6 +228,33 @@ def test_estimates_are_within_five_of_the_errors(name):
     assert ("contact_force_inside" in truth.error_estimate) == (not scene.closed)
 
 
+def gentle(s):
+    """A circle of discs with little twist."""
+    turn, a = 2 * np.pi * s / 3.7, 3.7 / (2 * np.pi)
+    return a * np.cos(turn), a * np.sin(turn), 0.02 * np.sin(turn), -0.2 + 0 * s
+
+
+def waves(s):
+    """A straight line that is twisted and rolls unevenly, periodic up to its length."""
+    q = 2 * np.pi * s / 3.7
+    return s, 0 * s, 0.4 * np.sin(q), 0.2 + 0.1 * np.cos(q)
+
+
+@pytest.mark.parametrize(
+    ("rolling", "initial", "shift"), [("field", wavy, 0.0), ("unit", wavy, 0.0), ("unit", gentle, 0.0), ("field", waves, 3.7)]
+)
+def test_estimates_of_rings_are_within_five_of_small_errors(rolling, initial, shift):
+    """Where functions and steps leave so little that sweeps count, too; steps of truth and field have 12 and 8 stages."""
+    scene = replace(breathing_ring(rolling, duration=0.6, **ROD), initial=initial, shift=(shift, 0.0))
+    truth, found = field(scene, 1e-9, frames=12), field(scene, 1e-6, frames=12)
+    for key, estimate in found.error_estimate.items():
+        if key != "energy":
+            error = np.abs(getattr(found, key) - getattr(truth, key)).max()
+            least = error if key == "contact_force" else error / 1.5
+            assert least < estimate < 5 * error or error < 5 * truth.error_estimate[key], (key, error, estimate)
+    assert found.error_estimate["contact_force"] < 1e-3
+
+
 def test_frames_within_steps_are_as_accurate_as_steps():
     """Rates at frames within steps at the limit of stability: the polynomial of a step is less accurate there."""
     scene, frames = SCENES["own"], 31
