@@ -12,6 +12,7 @@ from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
 from compare.random_runs import gathered as runs_of
 from compare.random_runs import trust_runs
+from compare.speed import speed
 from compare.sweeps import read
 from compare.trust import gathered, trust
 from compare.trust_table import Trust
@@ -20,6 +21,7 @@ from continuum import untwisting_rod
 from continuum.files import read_scene
 from discs import command_line
 from discs.chains.rolling import ROLLING
+from discs.kernels.background import wait_for_kernels
 
 
 def about(what: object) -> str:
@@ -52,6 +54,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--degree", type=int, choices=(1, 2), default=1, help="2: discs of order four, too; a scene with own headings (default: 1)"
     )
+    p.add_argument("--no-speed", action="store_true", help="skip the table of speed against error")
     p.add_argument("--no-limits", action="store_true", help="skip the discs with own headings (default scene only)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_main_job)
@@ -92,6 +95,7 @@ def add_trust(p: argparse.ArgumentParser) -> None:
 
 def run_trust(options: argparse.Namespace) -> None:
     """Run random scenes and write the table. If interrupted, write the results so far; the same command continues the run."""
+    wait_for_kernels()
     runs = options.problems is not None
     archive = Path(options.out) / ("trust-runs.jsonl" if runs else "trust.jsonl")
     measure, collect, count = (trust_runs, runs_of, options.problems) if runs else (trust, gathered, options.scenes)
@@ -206,6 +210,7 @@ def add_stability(p: argparse.ArgumentParser) -> None:
 
 def run_stability(options: argparse.Namespace) -> None:
     """Run the hard cases, write table and picture. If interrupted, write the results so far; the same command continues."""
+    wait_for_kernels()
     archive = Path(options.out) / "stability.jsonl"
     try:
         found = stability(options.quick, seconds=options.seconds, archive=archive, progress=not options.quiet)
@@ -230,6 +235,7 @@ def write_stability(found: Stability, out: str) -> None:
 
 def run_precision(options: argparse.Namespace) -> None:
     """Measure speed against error and write table and picture; an interrupted run writes its results to precision-partial.*."""
+    wait_for_kernels()
     found, name, stopped = WorkPrecision([], {}, {}), "precision", False
     with fresh_files(options.out) as folder:
         scenes = {name: precision.SCENES[name]() for name in options.scenes}
@@ -252,6 +258,7 @@ def run_precision(options: argparse.Namespace) -> None:
 
 def run_report(options: argparse.Namespace) -> None:
     """Write everything on one page."""
+    wait_for_kernels()
     report.report(options.out, options.n, options.tol, progress=not options.quiet)
     print(f"written to {options.out}: report.html, report.md, pictures and their data")
 
@@ -269,7 +276,15 @@ def run_main_job(options: argparse.Namespace) -> None:
         )
         if not options.scene and not options.no_limits:
             print(limits(options.out, not options.quiet, executor=executor))
-            print(f"\nwritten to {options.out}: headings.csv, limits.csv, locking.csv, limits.png")
+            print(f"\nwritten to {options.out}: headings.csv, limits.csv, locking.csv, limits.png\n", flush=True)
+    if not options.no_speed:
+        measured, table = speed(scene, not options.quiet)
+        print(f"speed against error, processor time, plain springs:\n{table}")
+        if measured is not None:
+            with fresh_files(options.out) as folder:
+                measured.save(folder / "speed.csv")
+                measured.plot(folder / "speed.png")
+            print(f"\nwritten to {options.out}: speed.csv, speed.png")
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -20,14 +20,17 @@ def ours(problem: Problem) -> list[Peer]:
     """
     t = problem.duration
 
+    def at_the_end(method: str | Integrator, dt: float | None = None, tol: float | None = None) -> Outcome:
+        return _outcome(problem, lambda: simulate(problem, method, dt, 1, progress=False, engine="compiled", tol=tol))
+
     def fixed(name: str, steps: Sequence[int], method: Callable[[int], Integrator]) -> Peer:
         def run(setting: float, seconds: float) -> Outcome:
-            return _outcome(problem, lambda: simulate(problem, method(int(setting)), t / setting, frames=1, progress=False))
+            return at_the_end(method(int(setting)), dt=t / setting)
 
         return Peer(name, tuple(map(float, steps)), run)
 
     def to_tolerance(setting: float, seconds: float) -> Outcome:
-        return _outcome(problem, lambda: simulate(problem, "auto", tol=setting, frames=1, progress=False))
+        return at_the_end("auto", tol=setting)
 
     many = [round(6 * 2 ** (j / 2)) for j in range(17)]
     return [

@@ -56,6 +56,7 @@ def work_precision(
     seconds: float = 10.0,
     progress: bool = True,
     into: WorkPrecision | None = None,
+    own: Callable[[Problem], list[Peer]] = ours,
 ) -> WorkPrecision:
     """Measure speed against error at the end of scenes.
 
@@ -69,10 +70,11 @@ def work_precision(
     ----------
     scenes : a scene, or several by name.
     n : numbers of discs, with plain springs at free ends. Chains with true curvature run in NumPy, by every method.
-    methods : problem -> methods to run; None takes ours and the peers that are installed.
+    methods : problem -> peers to run; None takes those that are installed.
     repeats : number of rounds.
     seconds : the longest processor time for one run; three times that for all runs of a method on a problem.
     progress : show a progress bar.
+    own : problem -> our methods to run.
     into : filled and returned, problem by problem, so that an interrupted run keeps the finished ones; a new one by default.
 
     Raises
@@ -87,7 +89,7 @@ def work_precision(
         for size in n:
             problem = lump(scene, size)
             exact, floor = reference(problem)
-            mine = ours(problem)
+            mine = own(problem)
             others = peers(problem) if methods is None else methods(problem)
             entries: list[_Entry] = []
             for peer in tqdm([*mine, *others], desc=f"{name}, N = {size}", disable=not progress, leave=False):

@@ -10,6 +10,7 @@ from compare import lump
 from continuum import breathing_ring, steered_rod, untwisting_rod
 from discs import Midpoint, Problem, SimulationError, simulate
 from discs.integrators import Work
+from discs.kernels.background import wait_for_kernels
 from discs.skew import Phase
 
 
@@ -94,6 +95,7 @@ def rounding() -> None:
 
 
 if __name__ == "__main__":
+    wait_for_kernels()
     sweeps()
     call()
     many_discs()

@@ -31,6 +31,7 @@ def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
         return in_numpy
     from discs.kernels import driver
     from discs.kernels.compiled import jit
+    from discs.kernels.lean import lean
 
     chain, inner = problem.system.parameters, jit(driver.reduced.__wrapped__)  # type: ignore[attr-defined]
     if chain.load.patterns.size:
@@ -46,7 +47,8 @@ def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
         def f(t, y, out):  # type: ignore[no-untyped-def]
             inner(chain, t, y, out)
 
-    f(0.0, read_only(y), np.empty_like(y))
+    with lean():
+        f(0.0, read_only(y), np.empty_like(y))
     f.disable_compile()  # type: ignore[attr-defined]
     return f
 

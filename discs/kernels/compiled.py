@@ -21,7 +21,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from contextvars import ContextVar
 from functools import cache, partial, singledispatch, wraps
 from pathlib import Path
 from types import ModuleType
@@ -40,7 +39,7 @@ UNUSED = 86_400.0  # seconds without use after which kernels of earlier content 
 CUT = -1, 0, 0  # the cost of a step that Ctrl-C interrupted
 Cost = tuple[int, int, int]  # of a step: gradients, solves, unconverged iterations
 
-_READILY = ContextVar("readily", default=False)
+_KERNELS: set[Callable[..., Any]] = set()
 _WAITING: list[Callable[[], object]] = []  # registrations to be made with numba
 _MODULES: dict[str, dict[str, Any]] = {}  # modules with parts, forms or kernels, and their contents
 _FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
@@ -124,12 +123,21 @@ class NotReady(Exception):
 
 @contextmanager
 def readily() -> Iterator[None]:
-    """Within it a kernel that would have to be compiled raises `NotReady`."""
-    token = _READILY.set(True)
-    try:
+    """Within it, in this thread, a kernel that would have to be compiled raises `NotReady`."""
+    from numba.core import event
+
+    here = threading.get_ident()
+
+    class Refuses(event.Listener):
+        def on_start(self, event: Any) -> None:
+            if event.data["dispatcher"].py_func in _KERNELS and threading.get_ident() == here:
+                raise NotReady
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Refuses()):
         yield
-    finally:
-        _READILY.reset(token)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -140,6 +148,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     known: dict[tuple[type, ...], Callable[..., Any]] = {}
+    _KERNELS.add(function)
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
@@ -171,8 +180,6 @@ def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
     if not kept:
         _warn_of_no_cache()
         return jit(function)
-    if _READILY.get() and not any(Path(kept).rglob("*.nbi")):
-        raise NotReady
     own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, kept
     try:
         return numba.njit(cache=True, nogil=True, **OPTIONS)(function)

@@ -20,7 +20,7 @@ FILES = ["convergence.csv", "convergence.png", "energy.png", "limits-of-all.png"
 def test_main_job(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("compare.main_job.LONG", 1.0)
     out = tmp_path / "new" / "out"
-    assert main(["--out", str(out), "--n", "9", "17", "--tol", "1e-3", "--no-limits", "--quiet"]) == 0
+    assert main(["--out", str(out), "--n", "9", "17", "--tol", "1e-3", "--no-limits", "--no-speed", "--quiet"]) == 0
     assert sorted(p.name for p in out.iterdir()) == FILES
     printed = capsys.readouterr().out
     assert "  17  0.250000  " in printed
@@ -30,8 +30,22 @@ def test_main_job(tmp_path, capsys, monkeypatch):
 def test_limits_are_part_of_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("compare.main_job.LONG", 1.0)
     monkeypatch.setattr("compare.__main__.limits", lambda out, *_, **__: f"limits of {out}")
-    assert main(["--out", str(tmp_path), "--n", "9", "17", "--tol", "1e-3", "--quiet"]) == 0
+    assert main(["--out", str(tmp_path), "--n", "9", "17", "--tol", "1e-3", "--no-speed", "--quiet"]) == 0
     assert f"limits of {tmp_path}" in capsys.readouterr().out
+
+
+def test_speed_against_error_is_part_of_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("compare.__main__.overview", lambda *_, **__: [])
+    monkeypatch.setattr("compare.__main__.summary", lambda studies: "")
+    for name, few in (("SIZES", (9,)), ("OURS", ("midpoint",)), ("OTHERS", ("SciPy LSODA",)), ("COMPILED", ("midpoint",))):
+        monkeypatch.setattr(f"compare.speed.{name}", few)
+    monkeypatch.setenv("DISCS_ENGINE", "compiled")
+    assert main(["--no-limits", "--out", str(tmp_path), "--quiet"]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["speed.csv", "speed.png"]
+    assert re.search(r"9 \| 1e-03 \| midpoint \| [\d.]+ ms \| SciPy LSODA \|", capsys.readouterr().out)
+    monkeypatch.setenv("DISCS_ENGINE", "plain")
+    assert main(["--no-limits", "--out", str(tmp_path / "plain"), "--quiet"]) == 0
+    assert "a run was plain: it was asked for" in capsys.readouterr().out
 
 
 @pytest.mark.long  # the paper's scheme with own headings has a kernel of its own
@@ -39,7 +53,7 @@ def test_steered_scene(tmp_path, capsys):
     (tmp_path / "steered.toml").write_text('scene = "steered_rod"\nduration = 0.5\nshear_stiffness = 6.0\nradius = 0.7\n')
     out = tmp_path / "out"
     arguments = ["--scene", str(tmp_path / "steered.toml"), "--out", str(out), "--n", "9", "17", "--tol", "1e-5", "--degree", "2"]
-    assert main([*arguments, "--quiet"]) == 0
+    assert main([*arguments, "--no-speed", "--quiet"]) == 0
     assert sorted(p.name for p in out.iterdir()) == FILES
     text = capsys.readouterr().out
     assert "error phi" in text
@@ -50,7 +64,12 @@ def test_steered_scene(tmp_path, capsys):
 def test_closed_scene(tmp_path, monkeypatch, capsys):
     (tmp_path / "ring.toml").write_text('scene = "breathing_ring"\nomega = -0.3\nduration = 0.4\nradius = 0.7\n')
     out = tmp_path / "out"
-    assert main(["--scene", str(tmp_path / "ring.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-4", "--quiet"]) == 0
+    assert (
+        main(
+            ["--scene", str(tmp_path / "ring.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-4", "--no-speed", "--quiet"]
+        )
+        == 0
+    )
     assert sorted(p.name for p in out.iterdir()) == FILES
     assert "breathing ring, field law" in capsys.readouterr().out
 
