@@ -183,8 +183,7 @@ def _once(
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
     stepwise = isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
     recorded = (stepwise or integrator.runs_whole) and checkpoint is None and not want and system.load is None
-    waits = engine in ("auto", "ready") and not because
-    there = kernels(engine, problem, integrator, h, asked=not recorded) if waits else True
+    there = bool(because) or kernels(engine, problem, integrator, h, not recorded, not progress)
     if not there:
         because = WAITING
     about = begun(integrator, because, want, h, suggested) | (more or {})
@@ -197,7 +196,7 @@ def _once(
         if record.complete:
             return record.solution({})
         album = Album(system, times, h) if recorded and not because else None
-        march = March(problem, integrator, h, not because, not progress, watch, "work_by_load" in want, album)
+        march = March(problem, integrator, h, not because, watch, "work_by_load" in want, album)
         first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
         if album is not None and (stepwise or _uncut(march.whole, record, 0, march)):
             _fill(album, march, shown, record)

@@ -13,13 +13,13 @@ from discs import Chain, Problem, State, SteeredChain
 from discs.integrators import METHODS
 from discs.kernels import dop853, driver
 from discs.kernels.__main__ import sharing
-from discs.kernels.background import ENGINE
+from discs.kernels.background import ENGINE, USUAL
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job: tests send Ctrl-C, to themselves and to children
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-os.environ[ENGINE] = "ready"  # of command lines, too: what `make tested` has not compiled runs plain
+os.environ[ENGINE] = USUAL[0] = "ready"  # of command lines, too: what `make tested` has not compiled runs plain
 
 
 @pytest.hookimpl(tryfirst=True)

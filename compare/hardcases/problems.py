@@ -179,7 +179,7 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
     problem = posed(partial(twisted, n, "paper", duration=duration))
     k, system, begun = problem.chain.k, problem.system, processor()
     h = k**2 / 8
-    run = March(problem, Leapfrog(), h, True, True)
+    run = March(problem, Leapfrog(), h, True)
     share, onset, energy, times = 0.0, np.nan, [], np.linspace(0, duration, 401)[1:]
     for t in times:
         while run.step < round(t / h):

@@ -146,7 +146,7 @@ class SlavedSystem(RollingDiscs):
     @cached_property
     def lanes(self) -> Parameters:
         """The same parameters in lanes (`discs.kernels.slaved_lanes`), for methods that take them; None for few or very many."""
-        if self.load is not None or not isinstance(self._springs, LinearCurvature):
+        if self.load is not None or not isinstance(self._springs, LinearCurvature) or self.parameters is None:
             return None
         from discs.kernels import slaved_lanes, slaved_stages  # noqa: F401, and the sweeps
 

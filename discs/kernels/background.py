@@ -22,14 +22,17 @@ ENGINE = "DISCS_ENGINE"  # in the environment: the engine of runs that are given
 SECONDS = 1.0  # between two looks whether kernels are there
 
 
+USUAL = [os.environ.get(ENGINE) or "auto"]
+
+
 def usual() -> str:
     """The engine of runs that are given none: the environment variable DISCS_ENGINE, or "auto"."""
-    return os.environ.get(ENGINE) or "auto"
+    return USUAL[0]
 
 
 def wait_for_kernels() -> None:
     """Runs that are given no engine wait for their kernels, as where times are measured. DISCS_ENGINE goes first."""
-    os.environ.setdefault(ENGINE, "compiled")
+    USUAL[0] = os.environ.setdefault(ENGINE, "compiled")
 
 
 class _Compiler:

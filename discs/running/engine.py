@@ -1,15 +1,12 @@
 """Which engine a run takes, and why."""
 
 from discs import checks
-from discs.chains.rolling_discs import RollingDiscs
-from discs.integrators import FixedStep, Integrator
+from discs.integrators import Integrator
 from discs.loads.own import OwnLoad
 from discs.problem import Problem
 
 ENGINES = ("auto", "ready", "compiled", "plain")
 WAITING = "its kernels are not compiled yet"
-
-PREPARED: set[tuple[object, ...]] = set()  # what `kinds` gave of runs whose kernels are there
 
 
 class Overtaken(Exception):
@@ -33,9 +30,3 @@ def plain_because(problem: Problem, integrator: Integrator, engine: str, want: t
         if not isinstance(load, OwnLoad) and load.parameters is None:
             return f"{name} has no compiled form here"
     return "the laws of this chain have no compiled form"
-
-
-def kinds(system: RollingDiscs, integrator: Integrator, asked: bool) -> tuple[object, ...]:
-    """What the kernels of a run depend on. asked : whether frames are asked for, or recorded by steps."""
-    chain = integrator.twin_of(system, system.parameters) if isinstance(integrator, FixedStep) else system.parameters
-    return asked, type(integrator), type(chain), *map(type, chain or ())  # the types of the chain's laws and load too

@@ -21,7 +21,7 @@ from discs.running.failure import SimulationError
 from discs.running.outcome import Outcome, as_data, from_data
 from discs.running.part import Settings, parts_of, run_part
 from discs.running.progress import NO_BAR, Progress
-from discs.running.time_loop import NOTICE
+from discs.running.ready import NOTICE
 from discs.runs import Runs
 from discs.warn import warn
 

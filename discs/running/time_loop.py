@@ -12,7 +12,6 @@ from discs.loads.shares import Shares
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.calls import heed_halt
-from discs.running.engine import PREPARED, kinds
 from discs.running.failure import SimulationError, blown_up, lost_heading
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.stats import Stats
@@ -20,7 +19,6 @@ from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
 from discs.warn import warn
 
-NOTICE = 2.0  # seconds of compiling after which a notice is printed; reading kernels from the cache does not count
 WATCHED = ("looks", "passed", "doubted", "defects", "places")  # attributes of a `Watch` that a restart needs
 CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown between calls, Ctrl-C is polled in every sweep
 TABLED = 20_000  # steps of one compiled call whose loads have tables of their signals
@@ -32,7 +30,7 @@ class March:
     Parameters
     ----------
     problem, integrator, h : the problem, the method and its step.
-    compiled : use the compiled form of the chain. quiet : print no notice that kernels are being compiled.
+    compiled : use the compiled form of the chain.
     watch : the estimate of the error of the steps; None for none.
     by_load : book what loads do one by one, too; for the plain form.
     album : the frames that compiled steps record; None if each frame is asked for.
@@ -51,7 +49,6 @@ class March:
         integrator: Integrator,
         h: float,
         compiled: bool,
-        quiet: bool,
         watch: Watch | None = None,
         by_load: bool = False,
         album: Album | None = None,
@@ -77,29 +74,19 @@ class March:
         self.memory: Memory = None
         if album is None or not integrator.runs_whole:  # otherwise only if that fails
             self._begin()
-        if self.parameters is not None:
-            self._prepare(quiet)
 
     def _begin(self) -> None:
         self.memory = self.integrator.begin(self.system, self.problem.start(), self.h, self.work, self.parameters)
 
-    def _prepare(self, quiet: bool) -> None:
-        """Compile the kernels (once per machine) or read them from disc (once per process)."""
-        asked = self.album is None  # for frames, by a kernel of its own
-        key = kinds(self.system, self.integrator, asked)
-        if key in PREPARED:
-            return
-        from discs.kernels.compiled import compiling, say_so
-
-        with compiling(lambda: None if quiet else say_so(self.integrator.name), NOTICE):
-            if self.twin is not None:
-                self.twin.march(self.system, self.parameters, self.memory, 0.0, self.h, 0, self.bound)
-            elif self.album is not None:
-                nothing = Album(self.system, self.album.times[:0], self.h)
-                self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.bound, nothing)
-            if asked:
-                self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
-        PREPARED.add(key)
+    def prepare(self) -> None:
+        """Call the kernels of the run once, which compiles them (once per machine) or reads them from disc (once per process)."""
+        if self.twin is not None:
+            self.twin.march(self.system, self.parameters, self.memory, 0.0, self.h, 0, self.bound)
+        elif self.album is not None:
+            nothing = Album(self.system, self.album.times[:0], self.h)
+            self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.bound, nothing)
+        if self.album is None:  # frames are asked for, by a kernel of its own
+            self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
 
     def whole(self) -> bool:
         """Take the whole run at once; False if the method cannot or the run fails, which then goes step by step."""

@@ -39,11 +39,11 @@ def test_speed_against_error_is_part_of_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("compare.__main__.summary", lambda studies: "")
     for name, few in (("SIZES", (9,)), ("OURS", ("midpoint",)), ("OTHERS", ("SciPy LSODA",)), ("COMPILED", ("midpoint",))):
         monkeypatch.setattr(f"compare.speed.{name}", few)
-    monkeypatch.setenv("DISCS_ENGINE", "compiled")
+    monkeypatch.setattr("discs.kernels.background.USUAL", ["compiled"])
     assert main(["--no-limits", "--out", str(tmp_path), "--quiet"]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["speed.csv", "speed.png"]
     assert re.search(r"9 \| 1e-03 \| midpoint \| [\d.]+ ms \| SciPy LSODA \|", capsys.readouterr().out)
-    monkeypatch.setenv("DISCS_ENGINE", "plain")
+    monkeypatch.setattr("discs.kernels.background.USUAL", ["plain"])
     assert main(["--no-limits", "--out", str(tmp_path / "plain"), "--quiet"]) == 0
     assert "a run was plain: it was asked for" in capsys.readouterr().out
 

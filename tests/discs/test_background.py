@@ -99,7 +99,7 @@ def kernels_come(monkeypatch):
         monkeypatch.setattr(fields, "Kernels", lambda *rest: there)
         monkeypatch.setattr(fields, "_PREPARED", set())
 
-    monkeypatch.setenv(background.ENGINE, "auto")
+    monkeypatch.setattr(background, "USUAL", ["auto"])
     return come
 
 
@@ -132,6 +132,6 @@ def test_prepared_kernels_are_not_looked_for_again(monkeypatch):
 
 
 def test_the_default_engine_is_checked(monkeypatch):
-    monkeypatch.setenv(background.ENGINE, "fast")
+    monkeypatch.setattr(background, "USUAL", ["fast"])
     with pytest.raises(ValueError, match="engine must be one of 'auto', 'ready', 'compiled', 'plain'; got 'fast'"):
         simulate(uneven(9, Model("springs", "field"), seed=4), dt=0.05)

@@ -14,7 +14,7 @@ from discs.integrators import METHODS
 from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
 from discs.kernels import banded, blocks, compiled, steered_links
-from discs.running import time_loop
+from discs.running import ready
 from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
 
 pytestmark = pytest.mark.slow
@@ -194,10 +194,10 @@ class Compiling(Midpoint):
 def test_compiling_is_announced_once(method, progress, monkeypatch, capsys):
     problem = uneven(5, Model("springs", "field"))
     simulate(problem, dt=0.5, frames=1, progress=False)  # all others are compiled
-    monkeypatch.setattr(time_loop, "PREPARED", set())
-    monkeypatch.setattr(time_loop, "NOTICE", 0.01)
+    monkeypatch.setattr(ready, "PREPARED", set())
+    monkeypatch.setattr(ready, "NOTICE", 0.01)
     for _ in range(2):
-        simulate(problem, method, 0.5, 1, progress=progress)
+        simulate(problem, method, 0.5, 1, progress=progress, engine="compiled")
     said = capsys.readouterr().err.count("compiling 'midpoint', once on this machine")
     assert said == (progress and isinstance(method, Compiling))
 

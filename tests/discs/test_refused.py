@@ -50,7 +50,7 @@ def test_bad_chains_are_refused(change, message):
         ({"frames": 0}, "frames must be a whole number of at least 1"),
         ({"frames": [0.5, 0.2]}, "increasing times within"),
         ({"frames": [0.5, 1.2]}, "increasing times within"),
-        ({"engine": "fast"}, "engine must be one of 'compiled', 'plain'; got 'fast'"),
+        ({"engine": "fast"}, "engine must be one of 'auto', 'ready', 'compiled', 'plain'; got 'fast'"),
         ({"dt": 0.1, "tol": 1e-3}, "give dt or tol, not both"),
         ({"tol": -1.0}, "tol must be a positive finite number"),
         ({"method": "RK45", "tol": 1e-3}, r"RK45 has tolerances of its own: RK45\(rtol=..., atol=...\)"),
