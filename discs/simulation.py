@@ -17,7 +17,7 @@ from discs.kernels.background import usual
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.doubt import doubted
-from discs.running.engine import ENGINES, WAITING, Overtaken, plain_because
+from discs.running.engine import WAITING, Overtaken, plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.progress import NO_BAR, Progress
 from discs.running.ready import kernels
@@ -86,7 +86,7 @@ def simulate(
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
-    engine, nothing = checks.choice("engine", engine or usual(), ENGINES), method is None and dt is None
+    engine, nothing = engine or usual(), method is None and dt is None
     if engine == "auto" and checkpoint is not None:
         engine = "compiled"
     if method == "auto" or tol is not None or nothing:

@@ -153,7 +153,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(function)
     def call(*arguments: Any) -> Any:
         kinds = tuple(map(type, arguments))
-        for argument in arguments:
+        for argument in arguments[:2]:
             if isinstance(argument, tuple):
                 kinds += tuple(map(type, argument))
         if kinds not in known:
