@@ -13,8 +13,7 @@ from discs.integrators.work import Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill
 from discs.kernels.interrupts import interrupted
-from discs.kernels.shared import add as advance
-from discs.kernels.shared import copy, renew, stuck, unsettled
+from discs.kernels.shared import copy, forward, reach, stuck, unsettled
 from discs.skew import Phase, SkewGradient, add
 
 WHOLE = np.ones(1)  # the fractions of h of a single midpoint step
@@ -119,17 +118,16 @@ class Composed(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Workspace: p like momenta; move, still (zero) like positions; change (n,)."""
+    """Workspace: p like momenta; move, still (zero) like positions."""
 
     p: Float
     move: Float
     still: Float
-    change: Float
 
 
 @fill(do.room, Composed, _nrt=True)
 def _room(method: Composed, chain: Any, state: Phase) -> Room:
-    return Room(np.empty_like(state.pi), np.empty_like(state.hi), np.zeros_like(state.hi), np.empty(state.hi.shape[1]))
+    return Room(np.empty_like(state.pi), np.empty_like(state.hi), np.zeros_like(state.hi))
 
 
 @fill(do.step, Composed, forceinline=True)
@@ -140,7 +138,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
         tau = method.fractions[part] * h
         do.basis(chain, work, room.still, work.c)
         copy(now.pi, p)
-        renew(work.c, p, 0.5 * tau, move, chain.scale, room.change)
+        forward(work.c, p, move, 0.5 * tau)
         sweep, change = 0, np.inf
         while unsettled(method, sweep, change):
             if interrupted(move.size):
@@ -152,11 +150,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
         time += tau
         solves += sweep
         unconverged = max(unconverged, stuck(method, sweep))
-        advance(now, move, 2.0, after)
-        for row in range(p.shape[0]):
-            mean, start, end = p[row], now.pi[row], after.pi[row]
-            for i in range(mean.size):
-                end[i] = 2 * mean[i] - start[i]
+        reach(chain, now, p, move, after)
         now = after
         do.settle(chain, work, now.hi, now.lo)
     return solves, solves, unconverged

@@ -6,7 +6,7 @@ c, v : (rows, n). p : (1, n), or (2, n) for steered discs.
 import numpy as np
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import fill, part
+from discs.kernels.compiled import fill, part, stub
 from discs.skew import Phase
 
 
@@ -105,6 +105,20 @@ def add(state, increment, factor, to):
             part = total - a[i]
             lo[i] = (a[i] - (total - part)) + (term - part)
             hi[i] = total
+
+
+@stub
+def reach(chain, start, p, move, end):
+    """The end of a midpoint step from `start`: twice the half step `move` later, with mean momenta p."""
+
+
+@fill(reach, object)
+def _reach(chain, start, p, move, end):
+    add(start, move, 2.0, end)
+    for row in range(p.shape[0]):
+        mean, before, after = p[row], start.pi[row], end.pi[row]
+        for i in range(mean.size):
+            after[i] = 2 * mean[i] - before[i]
 
 
 @part(fastmath={"contract", "reassoc"})

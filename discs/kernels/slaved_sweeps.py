@@ -10,6 +10,7 @@ from discs.kernels.abreast import END
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO, Order
 from discs.kernels.orders import corners, factor, join, pick, pull_ends, solve, wrap
+from discs.kernels.shared import reach
 from discs.kernels.slaved_lanes import LANED, moved
 from discs.kernels.slaved_matrix import GHOST, RING
 from discs.kernels.vectors import LANES, larger, largest, load, store, zero
@@ -163,6 +164,22 @@ def _sweep(chain, work, state, t, h, p, move, first):
         store(y, i, new_y)
         store(theta, i, new)
     return max(largest(larger(far_x, far_y) / load(chain.length, 0), work.spare), largest(far, work.spare))
+
+
+@fill(reach, *LANED)
+def _reach(chain, start, p, move, end):
+    """As disc by disc, see `discs.kernels.shared`."""
+    for row in range(3):
+        a, b, d, hi, lo = start.hi[row], start.lo[row], move[row], end.hi[row], end.lo[row]
+        for i in range(0, d.size, LANES):
+            given, term = load(a, i), 2.0 * load(d, i) + load(b, i)
+            total = given + term
+            part = total - given
+            store(lo, i, (given - (total - part)) + (term - part))
+            store(hi, i, total)
+    mean, before, after = p[0], start.pi[0], end.pi[0]
+    for i in range(0, mean.size, LANES):
+        store(after, i, 2.0 * load(mean, i) - load(before, i))
 
 
 @fill(do.pullback, *LANED)
