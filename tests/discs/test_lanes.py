@@ -9,7 +9,7 @@ from compare import lump
 from continuum import untwisting_rod
 from discs import Midpoint, SimulationError, simulate
 from discs.integrators import METHODS
-from discs.kernels import lanes, vectors
+from discs.kernels import lanes, orders, vectors
 from discs.kernels import protocol as do
 from discs.kernels.compiled import jit
 from discs.kernels.slaved_lanes import MANY, Laned
@@ -85,14 +85,14 @@ def test_vectors_are_computed_all_lanes_at_once():
 @pytest.mark.parametrize("kind", [float, complex])
 def test_elimination_in_lanes(kind):
     def solve(order, ring, corners, m, b):
-        lanes.factor(order, ring, corners, m)
-        lanes.solve(order, ring, corners, m, b)
+        orders.factor(order, ring, corners, m)
+        orders.solve(order, ring, corners, m, b)
 
     compiled, rng = jit(solve), np.random.default_rng(4)
     for n in [*SIZES, 1000]:
         order = lanes.order(n)
         for ring, corners in ((False, False), (False, True), (True, False)):
-            m, b = lanes.pick(lanes.matrices(order, kind(1), 1), 0), np.zeros(LANES * order.rows, kind)
+            m, b = orders.pick(orders.matrices(order, kind(1), 1), 0), np.zeros(LANES * order.rows, kind)
             entries = rng.standard_normal((4, n)) + (1j * rng.standard_normal((4, n)) if kind is complex else 0)
             a, u, w, right = entries
             a += 12
