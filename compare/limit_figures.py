@@ -46,7 +46,7 @@ def limits_of(study: Study, ax: Axes) -> None:
     slope = 4 if study.ends == "elements" else 1 if study.ends == "springs" and study.scene.rod.curvature == "linear" else 2
     line = 0.5 * errors.min(axis=1)[0] * (n / n[0]) ** -slope
     ax.plot(n, line, color=INK, linewidth=1)
-    ax.text(n[1], line[1], f"slope −{slope}    ", ha="right", va="center")
+    ax.text(n[1], line[1], f"slope −{slope}  ", ha="right", va="top")
     ax.set(xscale="log", yscale="log", xlabel="number of discs N")
     ax.set_xticks(study.n, minor=False)
     ax.xaxis.set_major_formatter(ScalarFormatter())

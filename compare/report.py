@@ -199,10 +199,14 @@ def _motion(page: Page, scenes: dict[str, Scene], fields: dict[str, Solution]) -
 
 
 def _limit(page: Page, studies: dict[str, list[Study]]) -> None:
-    page.add("## N → ∞", "Plain springs lose an order at the free ends; consistent ends recover it.")
+    page.add(
+        "## N → ∞",
+        "The largest error of N discs at the end of the motion. With many discs it falls like 1/N if the last discs have plain "
+        "springs, and like 1/N² with consistent ends, which treat the two free ends as the rod's equations do.",
+    )
     for law, pair in studies.items():
         rows = [row for study in pair for row in study.rows()]
-        page.figure(f"convergence_{law}", figures.convergence(pair), f"Discs against the {law} law's field.", pair[0].columns, rows)
+        page.figure(f"convergence_{law}", figures.convergence(pair), f"Errors of N discs, {law} law.", pair[0].columns, rows)
         page.add(table(pair[0].columns, rows))
 
 
@@ -214,10 +218,11 @@ def _ground(page: Page, study: Study) -> None:
     columns, *rows = study.wants_rows()
     page.add(
         "## The force of the ground",
-        "Inside the rod it tends to a force per length, at each free end to a force and a couple; forces on the last discs grow "
-        "like N. Errors with consistent ends, field law, relative to the largest value; ± is the spread of the last three orders.",
+        "The ground keeps each disc rolling by a force. For N → ∞ this becomes a force per length inside the rod, and a force and "
+        "a couple at each free end, as forces on the last discs grow like N. Errors with consistent ends, field law, relative to "
+        "the largest value; ± is the spread of the last three orders.",
     )
-    page.figure("ground", limits_of_all([study])[0], "The ground's force on discs against the field's.", columns, rows)
+    page.figure("ground", limits_of_all([study])[0], "Errors of the ground's force on N discs.", columns, rows)
     page.add(table(columns, rows))
 
 
@@ -228,9 +233,14 @@ def _laws(page: Page, fields: dict[str, Solution]) -> None:
     distance = np.array(
         [np.abs(getattr(a, f)[:, :: every[0]] - getattr(b, f)[:, :: every[1]]).max(axis=1) for f in ("x", "y", "theta")]
     )
-    page.add("## The paper's law against true rolling", "They agree while |r'| = 1, and the model lets |r'| drift.")
+    page.add(
+        "## The paper's law against true rolling",
+        "They agree while |r'| = 1, that is, while the line is not stretched; in the motion |r'| drifts.",
+    )
     rows = [(f"{t:g}", *(f"{d:.3g}" for d in at)) for t, at in zip(a.t, distance.T, strict=True)]
-    caption = "The two fields: their distance, and their lines, with the motion's data above."
+    caption = (
+        "Left: the largest distance between the two fields. Right: their lines from above; data of these are with the motions."
+    )
     page.figure("laws", figures.laws(fields, distance, INSTANTS)[0], caption, ("t", "x", "y", "theta"), rows)
 
 
@@ -238,7 +248,7 @@ def _energy(page: Page, runs: dict[str, Solution], scene: Scene) -> None:
     rows = [(label, t, e) for label, run in runs.items() for t, e in zip(run.t, run.energy, strict=True)]
     words = [f"{label}: {np.abs(run.energy / run.energy[0] - 1).max():.1e}" for label, run in runs.items()]
     page.add(f"## Energy over [0, {scene.duration:g}]", f"Largest relative error: {'; '.join(words)}.")
-    page.figure("energy", figures.energy(runs), "Energy of two methods.", ("method", "t", "energy"), rows)
+    page.figure("energy", figures.energy(runs), "The energy of two methods against time.", ("method", "t", "energy"), rows)
 
 
 def speed_peers(problem: Problem) -> list[Peer]:
@@ -262,7 +272,9 @@ def _stability(page: Page, executor: Executor, progress: bool) -> None:
     page.add("## Hard cases", "Small ones; `python -m compare stability` runs all.", found.summary(), found.words, found.grid())
     page.add("All runs: [report_stability_runs.csv](report_stability_runs.csv).")
     rows = [(law, *row) for law, w in found.waves.items() for row in zip(w.q, w.relation, w.measured, strict=True)]
-    caption = "Energy at steps far above the explicit limit, with all runs above, and growing waves."
+    caption = (
+        "Left: errors of the energy at steps far above the explicit limit; data are with all runs above. Right: growth of waves."
+    )
     page.figure("stability", drawn[0], caption, ("law", "q", "growth by the relation", "growth measured"), rows)
 
 
