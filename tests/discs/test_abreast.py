@@ -117,8 +117,9 @@ def test_a_lost_heading_is_left_to_simulate(kernels_as_python, noted):
     np.testing.assert_array_equal(runs.x[4], simulate(problems[4], "midpoint", 0.1, times, progress=False).x)
 
 
-def test_a_long_step_is_compared_as_in_one_run(kernels_as_python, noted):
+def test_a_long_step_is_compared_as_in_one_run(kernels_as_python, noted, monkeypatch):
     """With its two halves: the estimates are those of `simulate`, which runs with more than 2 % are left to."""
+    monkeypatch.setattr(step_error, "DOUBTFUL", 2e-3)
     problems = cloud(8, 9)
     runs = simulate_many(problems, "midpoint", 0.025, [0.3], progress=False)
     assert noted[0] == 8
