@@ -34,6 +34,8 @@ def speed(scene: Scene, progress: bool = True) -> tuple[WorkPrecision | None, st
             first = simulate(replace(problem, duration=problem.duration / 100), method, problem.duration / 100, 1, progress=False)
             if first.stats["engine"] != "compiled":
                 return None, f"none, as it needs compiled runs, and a run was plain: {first.stats['plain_because']}"
+    if not problems[0].energy():
+        return None, "none, as nothing moves"
     found = work_precision(scene, SIZES, _others, 1, SECONDS, progress, own=_own)
     return found, found.speedups(errors=(1e-3, 1e-4, 1e-5, 1e-6))
 

@@ -11,8 +11,9 @@ The error is measured: a motion on m_j functions is compared with one on m_{j+1}
    times the error of the coarser one, and the estimate is d/(1 - p). p is taken from the last two differences, and is at least
    1/3. If there is only one difference p is 1/2, or 4/5 if the initial fields are narrow, because functions that do not resolve
    narrow fields change little.
-4. What sweeps leave is part of the difference if the tolerance of sweeps of the finer motion is half or less. If not it is added,
-   as a bound, which may be far above the error of a motion that is much more accurate than asked for.
+4. What sweeps leave is added, as a bound, which may be far above the error of a motion that is much more accurate than asked for.
+   If the tolerance of sweeps of the finer motion is half or less, most of it is part of the difference, and UNSEEN of it is added:
+   sweeps that converge fast may be as many in both motions.
 
 At the corner s = 0, t = 0 the initial twist violates an end condition. This leaves waves of wave number q and size q^-6 or less in
 theta, and q^-4 in omega. So the errors finally fall like a power of the step, the third for theta, the second for omega.
@@ -44,6 +45,7 @@ LEAST, MOST = 1 / 3, 0.8  # limits of p, the error of a finer motion over that o
 RATE = 0.5  # least p of omega
 WANTED = 0.4  # p of wanted quantities: the estimate is within five of the error where their own p is from -2 to 0.88
 MORE_STEPS = 1.2  # ratio of the numbers of steps above which two motions differ by their errors of steps
+UNSEEN = 0.001  # share of what sweeps leave that the difference of two motions may not show; 5e-4 on waves of a straight rod
 SAME = 0.05  # relative: the end of a motion is real if two motions agree on its time to this
 
 
@@ -180,8 +182,9 @@ class Search:
             by_steps = distances(coarse.fields, self._shorter(coarse).fields)
             self.estimate = {name: error + by_steps[name] / (1 - LEAST) for name, error in self.estimate.items()}
         # on nine scenes sweeps moved x and y by up to 0.02 of their tolerance times the length, theta by 0.12, rates by 1.1 of it
-        if (rest := sweeps(coarse.tolerance)) < 2 * sweeps(fine.tolerance):  # the difference may not show the error of sweeps
-            self.estimate = {name: error + rest * self._swept.get(name, 1.0) for name, error in self.estimate.items()}
+        rest, seen = sweeps(coarse.tolerance), sweeps(coarse.tolerance) >= 2 * sweeps(fine.tolerance)
+        rest *= UNSEEN if seen else 1.0
+        self.estimate = {name: error + rest * self._swept.get(name, 1.0) for name, error in self.estimate.items()}
         return over(self.estimate, self._bound) <= 1
 
     def _shorter(self, motion: Motion) -> Motion:

@@ -64,12 +64,8 @@ def test_steered_scene(tmp_path, capsys):
 def test_closed_scene(tmp_path, monkeypatch, capsys):
     (tmp_path / "ring.toml").write_text('scene = "breathing_ring"\nomega = -0.3\nduration = 0.4\nradius = 0.7\n')
     out = tmp_path / "out"
-    assert (
-        main(
-            ["--scene", str(tmp_path / "ring.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-4", "--no-speed", "--quiet"]
-        )
-        == 0
-    )
+    arguments = ["--scene", str(tmp_path / "ring.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-4"]
+    assert main([*arguments, "--no-speed", "--quiet"]) == 0
     assert sorted(p.name for p in out.iterdir()) == FILES
     assert "breathing ring, field law" in capsys.readouterr().out
 

@@ -178,4 +178,4 @@ def test_what_functions_miss_of_the_start_is_estimated():
     found = search.runner.run(19, 1e-3)
     missed = found._replace(start=found.start | {"omega": 0.7})
     assert search._reached(missed, found._replace(tolerance=1e-4, steps=found.steps + 1))
-    assert search.estimate["omega"] == 0.7
+    assert search.estimate["omega"] == pytest.approx(0.7, rel=1e-6)

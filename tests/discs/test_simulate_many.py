@@ -90,7 +90,7 @@ def test_what_no_run_can_take_is_an_error():
         ({"dt": 0.1, "frames": [2.0]}, "frames must be increasing times within"),
         ({"dt": 0.1, "want": "speed"}, "want must be one of"),
         ({"dt": 0.1, "threads": 0}, "threads must be a whole number of at least 1"),
-        ({"dt": 0.1, "engine": "gpu"}, "engine must be one of 'auto', 'ready', 'compiled', 'plain'; got 'gpu'"),
+        ({"dt": 0.1, "engine": "gpu"}, "engine must be one of 'compiled', 'plain'; got 'gpu'"),
     ):
         with pytest.raises(ValueError, match=said):
             simulate_many(problems, **PLAIN | arguments)
