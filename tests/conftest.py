@@ -63,9 +63,10 @@ def models(kinds: list[Model]):
 
 
 def models_and_engines(kinds: list[Model], plain: list[Model] | None = None):
-    """Each model with the compiled twin where there is one, and with the plain one, which may be tried on fewer."""
+    """Each model with the compiled twin where there is one, and with the plain one, which may be tried on fewer or on more."""
     pairs = [(m, "compiled") for m in kinds if m.law != "true"]
-    pairs += [(m, "plain") for m in kinds if plain is None or m in plain or m.law == "true"]
+    every = dict.fromkeys([*kinds, *(plain or [])])
+    pairs += [(m, "plain") for m in every if plain is None or m in plain or m.law == "true"]
     return pytest.mark.parametrize(("model", "engine"), pairs, ids=[f"{m.law}-{m.ends}-{engine}" for m, engine in pairs])
 
 

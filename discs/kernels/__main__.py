@@ -1,7 +1,7 @@
 """`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it.
 
 With `--tested` those that the short suite runs: of the unit law and of discs with own headings not the explicit methods with fixed
-steps, in lanes not the Gauss methods of the unit law, and of chains side by side only the midpoint method with the field law.
+steps, and of chains side by side only the midpoint method with the field law.
 """
 
 import argparse
@@ -54,8 +54,6 @@ def compile_for(law: str, tested: bool) -> None:
         for methods in sharing(law, tested):
             first = methods[0]
             if n == MANY and not (isinstance(first, FixedStep) and first.in_lanes and problem.system.lanes):
-                continue
-            if n == MANY and tested and law != "field" and first.name != "midpoint":
                 continue
             in_lanes = n != MANY and not steered and isinstance(first, FixedStep) and first.in_lanes
             if in_lanes and (not tested or (law, first.name) == ("field", "midpoint")):
