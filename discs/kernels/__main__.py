@@ -40,31 +40,29 @@ SOME = "midpoint", "gauss6", "DOP853"
 TESTED = {"own": SOME, "unit": SOME}  # by the short suite; of other chains all
 
 
-def compile_for(law: str, tested: bool) -> None:
-    """Compile every kernel for one kind of chain, or those that are tested: slaved headings with a law, or "own" headings.
+SIZES = {"few": 9, "many": MANY}  # discs; many with slaved headings have kernels of their own, those in lanes
 
-    Many discs have kernels of their own, those in lanes.
-    """
+
+def compile_for(law: str, size: str, tested: bool) -> None:
+    """Compile every kernel for one kind of chain, or those that are tested: slaved headings with a law, or "own" headings."""
     steered = law == "own"
     words = "discs with own headings" if steered else f"discs with slaved headings, {law} law"
     values: dict[str, Any] = dict.fromkeys(ONES + STEERED if steered else ONES, 1.0)
-    for n in (9, MANY):
-        chain: Chain | SteeredChain = SteeredChain(n=n, **values) if steered else Chain(n=n, **values, rolling=law)
-        problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if steered else None), 0.01)  # at rest
-        for methods in sharing(law, tested):
-            first = methods[0]
-            if n == MANY and not (isinstance(first, FixedStep) and first.in_lanes and problem.system.lanes):
-                continue
-            in_lanes = n != MANY and not steered and isinstance(first, FixedStep) and first.in_lanes
-            if in_lanes and (not tested or (law, first.name) == ("field", "midpoint")):
-                simulate_many([problem] * 3, first, 0.005, threads=1, progress=False)
-                print(f"{words}, side by side: {', '.join(method.name for method in methods)} compiled", flush=True)
-            simulate(problem, first, 0.005, frames=1, progress=False, engine="compiled")
-            simulate(
-                problem, first, 0.005, frames=1, want="velocity", progress=False, engine="compiled"
-            )  # frames asked for have kernels of their own
-            how = ", in lanes" if n == MANY else ""
-            print(f"{words}{how}: {', '.join(method.name for method in methods)} compiled", flush=True)
+    n = SIZES[size]
+    chain: Chain | SteeredChain = SteeredChain(n=n, **values) if steered else Chain(n=n, **values, rolling=law)
+    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if steered else None), 0.01)  # at rest
+    for methods in sharing(law, tested):
+        first = methods[0]
+        if n == MANY and not (isinstance(first, FixedStep) and first.in_lanes and problem.system.lanes):
+            continue
+        in_lanes = n != MANY and not steered and isinstance(first, FixedStep) and first.in_lanes
+        if in_lanes and (not tested or (law, first.name) == ("field", "midpoint")):
+            simulate_many([problem] * 3, first, 0.005, threads=1, progress=False)
+            print(f"{words}, side by side: {', '.join(method.name for method in methods)} compiled", flush=True)
+        for want in ((), "velocity"):  # frames asked for have kernels of their own
+            simulate(problem, first, 0.005, frames=1, want=want, progress=False, engine="compiled")
+        how = ", in lanes" if n == MANY else ""
+        print(f"{words}{how}: {', '.join(method.name for method in methods)} compiled", flush=True)
 
 
 if __name__ == "__main__":
@@ -75,14 +73,17 @@ if __name__ == "__main__":
         metavar="KIND",
         help=f"of chains, {' or '.join(KINDS)}, or a law; without any all, side by side",
     )
+    asked.add_argument("--discs", choices=SIZES, help="only those of few discs, or of many, in lanes (default: both)")
     asked.add_argument("--tested", action="store_true", help="only those that the short suite runs")
     given = asked.parse_args()
     laws = {law: (law,) for kind in KINDS.values() for law in kind}
     if unknown := set(given.kinds) - (KINDS | laws).keys():
         asked.error(f"KIND is {' or '.join(KINDS | laws)}; got {', '.join(sorted(unknown))}")
     for law in (law for kind in given.kinds for law in (KINDS | laws)[kind]):
-        compile_for(law, given.tested)
+        for size in [given.discs] if given.discs else SIZES:
+            compile_for(law, size, given.tested)
     if not given.kinds:  # side by side
-        more = ["--tested"] * given.tested
-        running = [subprocess.Popen([sys.executable, "-m", "discs.kernels", law, *more]) for law in laws]
+        command = [sys.executable, "-m", "discs.kernels", *["--tested"] * given.tested]
+        kinds = [(law, size) for size in ([given.discs] if given.discs else SIZES) for law in laws]
+        running = [subprocess.Popen([*command, law, "--discs", size]) for law, size in kinds]
         sys.exit(max(process.wait() for process in running))
