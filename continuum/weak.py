@@ -112,7 +112,8 @@ class Weak(NamedTuple):
 
     def at(self, t: Float) -> Float:
         """The signals of the compiled form at the times of stages (s,)."""
-        return np.column_stack([np.ones(t.size), self.values(t), self.motors.rates(t)])
+        # C order, whatever their number: one kernel serves rods with and without loads
+        return np.ascontiguousarray(np.column_stack([np.ones(t.size), self.values(t), self.motors.rates(t)]))
 
     def values(self, t: Float) -> Float:
         """The signals at times (m,), (m, L)."""

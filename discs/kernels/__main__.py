@@ -38,8 +38,6 @@ def sharing(law: str, tested: bool = False) -> list[list[Integrator]]:
 KINDS = {"slaved": tuple(ROLLING), "own": ("own",)}  # of chains
 SOME = "midpoint", "gauss6", "DOP853"
 TESTED = {"own": SOME, "unit": SOME}  # by the short suite; of other chains all
-
-
 SIZES = {"few": 9, "many": MANY}  # discs; many with slaved headings have kernels of their own, those in lanes
 
 

@@ -20,7 +20,8 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache, partial, singledispatch, wraps
 from pathlib import Path
 from types import ModuleType
@@ -39,6 +40,7 @@ UNUSED = 86_400.0  # seconds without use after which kernels of earlier content 
 CUT = -1, 0, 0  # the cost of a step that Ctrl-C interrupted
 Cost = tuple[int, int, int]  # of a step: gradients, solves, unconverged iterations
 
+_READILY = ContextVar("readily", default=False)
 _KERNELS: set[Callable[..., Any]] = set()
 _WAITING: list[Callable[[], object]] = []  # registrations to be made with numba
 _MODULES: dict[str, dict[str, Any]] = {}  # modules with parts, forms or kernels, and their contents
@@ -123,7 +125,17 @@ class NotReady(Exception):
 
 @contextmanager
 def readily() -> Iterator[None]:
-    """Within it, in this thread, a kernel that would have to be compiled raises `NotReady`."""
+    """Within it a kernel that would have to be compiled raises `NotReady`."""
+    token = _READILY.set(True)
+    try:
+        yield
+    finally:
+        _READILY.reset(token)
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Within it numba compiles no kernel in this thread: it raises `NotReady`."""
     from numba.core import event
 
     here = threading.get_ident()
@@ -138,6 +150,19 @@ def readily() -> Iterator[None]:
 
     with event.install_listener("numba:compile", Refuses()):
         yield
+
+
+def _surely_missing(function: Callable[..., Any], *kinds: type) -> bool:
+    """Whether a kernel is not in the cache, as far as can be told without importing numba, which takes a second."""
+    base = Path(os.environ.get("NUMBA_CACHE_DIR") or HERE / "__pycache__")
+    if (
+        "numba" in sys.modules
+        or Path(".numba_config.yaml").exists()
+        or not os.access(base if base.exists() else base.parent, os.W_OK)
+    ):
+        return False
+    name, files = "-".join([function.__name__, *(kind.__name__ for kind in kinds)]), _files(function, *kinds)
+    return not any((base / f"kernels-{name}-{_content(files)}").rglob("*.nbi"))
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -156,13 +181,19 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         for argument in arguments[:2]:
             if isinstance(argument, tuple):
                 kinds += tuple(map(type, argument))
-        if kinds not in known:
-            with lean():
-                made = known.get(kinds) or compiled(function, *(kind for kind in kinds if kind in _FORMS))
-                result = made(*arguments)
-                known[kinds] = made
-            return result
-        return known[kinds](*arguments)
+        if kinds in known and not _READILY.get():
+            return known[kinds](*arguments)
+        forms = [kind for kind in kinds if kind in _FORMS]
+        with ExitStack() as stack:
+            if _READILY.get():
+                if kinds not in known and _surely_missing(function, *forms):
+                    raise NotReady
+                stack.enter_context(_refusing())
+            stack.enter_context(lean())
+            made = known.get(kinds) or compiled(function, *forms)
+            result = made(*arguments)
+            known[kinds] = made
+        return result
 
     call.known = known  # type: ignore[attr-defined]  # for tests
     return call

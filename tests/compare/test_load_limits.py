@@ -14,7 +14,7 @@ from discs.loads import Damping, Force, Rest, Slope, Spring, Torque, signals
 pytestmark = pytest.mark.slow
 
 
-SHORT = "rolling resistance", "rest curvature", "ring, torque", "own, actuated", "varying rod"  # run by `make test`
+SHORT = "rolling resistance", "ring, torque", "own, actuated", "varying rod"  # run by `make test`
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in SHORT else pytest.mark.long) for name in scenes()])

@@ -1,6 +1,9 @@
 """Kernels that are compiled in the background: what runs do until they are there."""
 
 import multiprocessing
+import os
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -135,3 +138,14 @@ def test_the_default_engine_is_checked(monkeypatch):
     monkeypatch.setattr(background, "USUAL", ["fast"])
     with pytest.raises(ValueError, match="engine must be one of 'auto', 'ready', 'compiled', 'plain'; got 'fast'"):
         simulate(uneven(9, Model("springs", "field"), seed=4), dt=0.05)
+
+
+def test_a_missing_kernel_is_found_without_importing_numba(tmp_path):
+    code = (
+        "import sys; from discs import simulate; from discs.chains.twist import untwisting_chain;"
+        "run = simulate(untwisting_chain(9, duration=0.1), dt=0.05, frames=1, progress=False, engine='ready');"
+        "print(run.stats['engine'], 'numba' in sys.modules)"
+    )
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    told = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True).stdout
+    assert told == "plain False\n"
