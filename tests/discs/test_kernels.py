@@ -228,7 +228,7 @@ def test_engines_agree_to_some_ulps():
     two-step scheme: 62 and 54). Over the run each step adds roundings of a unit or so, of either sign."""
     for rolling in ("field", "unit", "own"):
         problem = untwisting_chain(16, rolling)
-        for method, dt, ulps in (("midpoint", 0.02, 16), ("gauss6", 0.05, 16), ("leapfrog", None, 128))[: 3 - (rolling == "own")]:
+        for method, dt, ulps in (("midpoint", 0.02, 16), ("gauss6", 0.05, 16), ("leapfrog", None, 128))[: 2 + (rolling == "field")]:
             a, b = (simulate(problem, method, dt, 2, progress=False, engine=engine) for engine in ("compiled", "plain"))
             for name in (*problem.system.rows, "omega"):
                 one, other = getattr(a, name)[-1], getattr(b, name)[-1]

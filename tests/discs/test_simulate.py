@@ -133,7 +133,7 @@ def test_collapsing_ring_stops_with_time_and_disc(dt):
     assert caught.value.time == pytest.approx(end, abs=dt + 0.02)  # 24 discs are late by 0.01
 
 
-@pytest.mark.parametrize("engine", ["compiled", "plain"])
+@pytest.mark.parametrize("engine", ["ready", "plain"])
 @pytest.mark.parametrize("method", FIXED)
 def test_every_method_stops_at_the_collapse(method, engine):
     problem, end = collapsing(32)
