@@ -14,15 +14,15 @@ from continuum.pieces import POINTS
 from continuum.rod import Scene
 from continuum.stepping import Steps
 from continuum.wants import with_inside
+from discs import checks
 from discs.arrays import Float
 from discs.kernels.background import Kernels, usual
+from discs.running.engine import ENGINES
 from discs.skew import Phase
 
 NODES = 1025  # nodes of a solution, enough for splines and their derivatives; more if the initial fields are narrow
 MOST_NODES = 8192
 FEWEST = 19  # functions of a step that only compiles
-
-
 _PREPARED: set[tuple[type, ...]] = set()  # kinds of rods whose kernels are there
 
 
@@ -109,7 +109,8 @@ class Runner:
         """Whether to use kernels."""
         if self._compiled is not None:
             return self._compiled
-        if (engine := usual()) in ("compiled", "plain"):
+        engine = checks.choice("DISCS_ENGINE", usual(), ENGINES)
+        if engine in ("compiled", "plain"):
             return engine == "compiled"
         key = type(rod.parameters), *map(type, rod.parameters)
         if key not in _PREPARED:

@@ -182,8 +182,9 @@ class Search:
             by_steps = distances(coarse.fields, self._shorter(coarse).fields)
             self.estimate = {name: error + by_steps[name] / (1 - LEAST) for name, error in self.estimate.items()}
         # on nine scenes sweeps moved x and y by up to 0.02 of their tolerance times the length, theta by 0.12, rates by 1.1 of it
-        rest, seen = sweeps(coarse.tolerance), sweeps(coarse.tolerance) >= 2 * sweeps(fine.tolerance)
-        rest *= UNSEEN if seen else 1.0
+        rest = sweeps(coarse.tolerance)
+        if rest >= 2 * sweeps(fine.tolerance):
+            rest *= UNSEEN
         self.estimate = {name: error + rest * self._swept.get(name, 1.0) for name, error in self.estimate.items()}
         return over(self.estimate, self._bound) <= 1
 

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -20,9 +21,7 @@ from discs.kernels.compiled import NotReady, readily, uncached
 
 ENGINE = "DISCS_ENGINE"  # in the environment: the engine of runs that are given none
 SECONDS = 1.0  # between two looks whether kernels are there
-
-
-USUAL = [os.environ.get(ENGINE) or "auto"]
+USUAL = [os.environ.get(ENGINE) or "auto"]  # that engine
 
 
 def usual() -> str:
@@ -32,7 +31,7 @@ def usual() -> str:
 
 def wait_for_kernels() -> None:
     """Runs that are given no engine wait for their kernels, as where times are measured. DISCS_ENGINE goes first."""
-    USUAL[0] = os.environ.setdefault(ENGINE, "compiled")
+    USUAL[0] = os.environ[ENGINE] = os.environ.get(ENGINE) or "compiled"
 
 
 class _Compiler:
@@ -40,8 +39,8 @@ class _Compiler:
 
     def __init__(self) -> None:
         self.process: subprocess.Popen[bytes] | None = None
-        self.asked: set[bytes] = set()
-        self.lock = threading.Lock()
+        self.asked: set[int] = set()  # hashes of the jobs
+        self.lock, self.turn = threading.Lock(), threading.Lock()
 
     def ask(self, job: bytes) -> bool:
         """Send a job; False if the process ended before it did all that it was asked."""
@@ -59,15 +58,21 @@ class _Compiler:
                 print("compiling kernels in the background: runs are plain, and slower, until they are there", file=sys.stderr)
             if self.process.poll() is not None:
                 return False
-            if job not in self.asked:
-                assert self.process.stdin is not None
-                try:
-                    self.process.stdin.write(job)
-                    self.process.stdin.flush()
-                except OSError:
-                    return False
-                self.asked.add(job)
+            if hash(job) not in self.asked:
+                self.asked.add(hash(job))
+                threading.Thread(target=self._send, args=(self.process, job), daemon=True).start()
             return True
+
+    def _send(self, process: "subprocess.Popen[bytes]", job: bytes) -> None:
+        """Write a job, which waits while an earlier one compiles if it is large."""
+        assert process.stdin is not None
+        with self.turn:
+            try:
+                process.stdin.write(job)
+                process.stdin.flush()
+            except OSError:  # the process has ended, which `ask` sees
+                with suppress(OSError):
+                    process.stdin.close()
 
 
 COMPILER = _Compiler()

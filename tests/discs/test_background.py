@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -28,6 +29,12 @@ def prepare(x):
     doubled(x)
 
 
+def prepare_slowly(x, ballast):
+    """Long in the process that compiles, as there a kernel is not refused."""
+    doubled(x)
+    time.sleep(3.0)
+
+
 @pytest.fixture
 def empty_cache(tmp_path, monkeypatch):
     """No kernels, and no process that compiles them."""
@@ -41,7 +48,9 @@ def empty_cache(tmp_path, monkeypatch):
     yield compiler
     compiled._cache.cache_clear()
     if compiler.process is not None:
-        compiler.process.communicate(timeout=60)
+        with compiler.turn, suppress(OSError):  # all jobs are written
+            compiler.process.stdin.close()
+        compiler.process.wait(60)
 
 
 def test_a_kernel_that_is_not_there_is_compiled_in_the_background(empty_cache, capfd):
@@ -138,6 +147,16 @@ def test_the_default_engine_is_checked(monkeypatch):
     monkeypatch.setattr(background, "USUAL", ["fast"])
     with pytest.raises(ValueError, match="engine must be one of 'auto', 'ready', 'compiled', 'plain'; got 'fast'"):
         simulate(uneven(9, Model("springs", "field"), seed=4), dt=0.05)
+    with pytest.raises(ValueError, match="DISCS_ENGINE must be one of 'auto', 'ready', 'compiled', 'plain'; got 'fast'"):
+        solve(untwisting_rod(duration=0.5), 1e-3, progress=False)
+
+
+def test_a_large_job_does_not_keep_its_run_waiting(empty_cache):
+    """Two of a megabyte: the second one waits in the pipe until the first is done."""
+    begun = time.monotonic()
+    assert missing(prepare_slowly, 1.5, bytes(2**20))
+    assert missing(prepare_slowly, 2, bytes(2**20))
+    assert time.monotonic() - begun < 3.0
 
 
 def test_a_missing_kernel_is_found_without_importing_numba(tmp_path):
