@@ -70,7 +70,7 @@ class _Compiler:
             try:
                 process.stdin.write(job)
                 process.stdin.flush()
-            except OSError:  # the process has ended, which `ask` sees
+            except (OSError, ValueError):  # the process has ended, or its pipe is closed: `ask` sees it
                 with suppress(OSError):
                     process.stdin.close()
 
