@@ -19,7 +19,8 @@ from typing import Any, NamedTuple, Protocol, TypeAlias, final
 
 import numpy as np
 
-from discs.arrays import Float
+from discs.arrays import Float, Matrix
+from discs.differences import jacobian
 
 # Every system has its own types for these; integrators only pass them on
 Shape: TypeAlias = Any
@@ -102,6 +103,11 @@ class Load(ABC):
     @abstractmethod
     def force(self, t: float, q: Float, v: Float) -> Float:
         """f, (rows, n), at the time t, positions q (rows, n) and velocities v (rows, n)."""
+
+    def derivatives(self, t: float, q: Float, v: Float) -> tuple[Matrix, Matrix]:
+        """df/dq and df/dv without what motors do, sparse (rows n, rows n); here by differences, with errors of about 1e-12."""
+        of_v = jacobian(lambda there: self.applied(t, q, there), v)
+        return jacobian(lambda there: self.applied(t, there, v), q), of_v
 
     def bands(self, t: float, q: Float, c: Float, d: complex, g: complex) -> Any:
         """Upper bands of d C^T D C + g C^T S C, for the rest of D = -df/dv and S = -df/dq (`discs.loads.bends`); None for none."""

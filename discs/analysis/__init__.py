@@ -1,1 +1,5 @@
-"""What is asked of a motion besides its run: the place of modes, Lyapunov exponents and gradients, none of which is written yet."""
+"""Small motions about a state: the linearised equations and what follows from them; see docs/small-motions.md."""
+
+from discs.analysis.linear import Linearised, linearise
+
+__all__ = ["Linearised", "linearise"]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
-from discs.arrays import Float, Int
+from discs.arrays import Float, Int, Matrix
 from discs.skew import Parameters, Placed, Secant, Shape, SkewGradient
 
 
@@ -17,6 +17,30 @@ class Joined(NamedTuple):
     disc: Int
     slope: Float | float
     mean: Float | float
+
+
+class Strains(NamedTuple):
+    """The strains s of all springs at a configuration: V = |sqrt(stiffness) s|^2/2 and grad^2 V = B^T (stiffness) B + bent.
+
+    matrix : B = ds/dq, sparse (springs, rows n); the columns are row after row of q.
+    stiffness : (springs,).
+    bent : sum over the springs of stiffness s grad^2 s, sparse (rows n, rows n); zero if V is quadratic.
+    """
+
+    matrix: Matrix
+    stiffness: Float
+    bent: Matrix
+
+
+class Turn(NamedTuple):
+    """The change of the basis C with one of the quantities h = heading q[row] that it depends on.
+
+    row : of q. heading : sparse (n, n). basis : dC/dh, (rows, n), disc by disc.
+    """
+
+    row: int
+    heading: Matrix
+    basis: Float
 
 
 class RollingDiscs(SkewGradient):
@@ -69,7 +93,15 @@ class RollingDiscs(SkewGradient):
         """Kinetic energy of rates (rows, n)."""
         return 0.5 * float(np.vdot(v, self.weights * v))
 
+    @abstractmethod
+    def turns(self, shape: Shape) -> list[Turn]:
+        """How C changes with q. The columns of C at a disc depend on its heading only."""
+
     # Springs
+
+    @abstractmethod
+    def strains(self, shape: Shape) -> Strains:
+        """The strains of all springs and their derivatives, for linearised equations."""
 
     @abstractmethod
     def stiffness(self, secant: Secant, c: Float) -> Float:

@@ -17,11 +17,11 @@ from functools import cached_property
 
 import numpy as np
 
-from discs.arrays import Float, Int
+from discs.arrays import Float, Int, Matrix
 from discs.chains import stencils
 from discs.chains.chain import Chain
 from discs.chains.links import LinearCurvature
-from discs.chains.rolling_discs import RollingDiscs, folded
+from discs.chains.rolling_discs import RollingDiscs, Strains, Turn, folded
 from discs.kernels.limits import LOST_HEADING
 from discs.skew import Load, Parameters, Placed, Secant
 
@@ -111,10 +111,31 @@ class SlavedSystem(RollingDiscs):
         disc = int(np.argmin(nearest))
         return disc if nearest[disc] < LOST_HEADING else None
 
+    def turns(self, shape: Float) -> list[Turn]:
+        """With z = r': de = R J dh and d(1/sqrt m) = -w rho e . de/m^(3/2)."""
+        z, e = self.slope(shape), self.contact(shape)
+        root = np.sqrt(self.inertia(e))
+        found = []
+        for row in (0, 1):
+            along = np.zeros_like(z)
+            along[row] = 1.0
+            turned = self._law.rate(z, along)
+            de = self._radius * np.array([-turned[1], turned[0]])
+            shrink = -self.weights[0] * (e * de).sum(axis=0) / root**3
+            found.append(Turn(row, self._headings, np.array([*(de / root + e * shrink), shrink])))
+        return found
+
+    @cached_property
+    def _headings(self) -> Matrix:
+        return stencils.matrix(lambda r: stencils.slopes(stencils.links(r, self._ends), self._k, self._ends), self.n, self._ends)
+
     # Springs
 
     def potential(self, shape: Float) -> float:
         return self._springs.potential(shape)
+
+    def strains(self, shape: Float) -> Strains:
+        return self._springs.strains(shape)
 
     def polarised(self, shape: Float, other: Float) -> float:
         return self._springs.polarised(shape, other)

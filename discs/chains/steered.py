@@ -26,11 +26,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 
-from discs.arrays import Float, Int
+from discs.arrays import Float, Int, Matrix
 from discs.chains import elements, stencils
 from discs.chains.chain import SteeredChain
-from discs.chains.rolling_discs import Assembly, Joined, RollingDiscs, folded
+from discs.chains.rolling_discs import Assembly, Joined, RollingDiscs, Strains, Turn, folded
 from discs.skew import Load, Parameters, Placed
 
 
@@ -141,7 +142,41 @@ class SteeredSystem(RollingDiscs):
     def lost_heading(self, before: Placed, after: Placed) -> int | None:
         return None
 
+    def turns(self, shape: Links) -> list[Turn]:
+        """de/dphi = J e."""
+        c = self.basis(shape)
+        return [Turn(3, scipy.sparse.eye_array(self.n, format="csr"), np.array([-c[1], c[0], 0 * c[2], 0 * c[3]]))]
+
     # Springs
+
+    @cached_property
+    def _joining(self) -> tuple[Matrix, Matrix]:
+        """Sparse matrices (n_links, n): differences, and mean headings, where strains are taken."""
+        points = np.arange(self._stiffness.shape[1])
+
+        def joining(name: str) -> Matrix:
+            parts = [(np.broadcast_to(getattr(j, name), points.shape), (points, j.disc)) for j in self._joined]
+            found = [scipy.sparse.csr_array(part, shape=(points.size, self.n)) for part in parts]
+            return sum(found[1:], start=found[0])
+
+        return joining("slope"), joining("mean")
+
+    def strains(self, shape: Links) -> Strains:
+        """With Gamma = u - (1, 0) and u = T(-m) d/k: dGamma/dm = -J u, and a second derivative by m, one by m and d."""
+        (apart, mean), section = self._joining, self.secant(shape, self._no_step)
+        scaled, none, diagonal = apart / self._k, 0 * mean, scipy.sparse.diags_array
+        rows = [
+            [diagonal(section.along[a, 0]) @ apart, diagonal(section.along[a, 1]) @ apart, none, diagonal(section.across[a]) @ mean]
+            for a in (0, 1)
+        ]
+        matrix = scipy.sparse.block_array([*rows, [none, none, scaled, none], [none, none, none, scaled]], format="csr")
+        stress = self._stiffness[:2] * section.strain[:2]
+        u = np.array([-section.across[1], section.across[0]])
+        mixed = [mean.T @ diagonal(stress[0] * section.along[1, a] - stress[1] * section.along[0, a]) @ apart for a in (0, 1)]
+        twice = mean.T @ diagonal(-(stress * u).sum(axis=0)) @ mean
+        blank = 0 * twice
+        bent = [[blank] * 3 + [mixed[0].T], [blank] * 3 + [mixed[1].T], [blank] * 4, [*mixed, blank, twice]]
+        return Strains(matrix, self._stiffness.ravel(), scipy.sparse.block_array(bent, format="csr"))
 
     def _strain(self, d: Float, middle: Float) -> Float:
         cos, sin, k = np.cos(middle), np.sin(middle), self._k

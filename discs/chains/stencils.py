@@ -8,9 +8,12 @@ Kinds of ends: "springs" (plain), "paper" (the same springs, heavier end discs, 
 end discs too) and "ring" (no ends). Beyond each free end there is a ghost disc, see `extended`.
 """
 
-import numpy as np
+from collections.abc import Callable
 
-from discs.arrays import Float
+import numpy as np
+import scipy  # its parts, slow to import, when they are used
+
+from discs.arrays import Float, Matrix
 
 ENDS = ("springs", "consistent", "paper", "ring")
 
@@ -127,3 +130,25 @@ def bend_shares(n: int, k: float, ends: str) -> Float:
     if ends == "consistent":
         w[[0, -1]] = k / 2
     return w
+
+
+def matrix(stencil: Callable[[Float], Float], n: int, ends: str) -> Matrix:
+    """The sparse matrix of a linear stencil, as `links`, that reaches at most four discs: (..., n) -> (..., m), m = n or n - 1.
+
+    Rows inside are alike, so the rows of few discs give those of many.
+    """
+    few = min(n, 9)
+    block = stencil(np.eye(few)).T
+    m = block.shape[0] + n - few
+    i = np.arange(m)[:, None]
+    if few == n:
+        like, first = i, 0 * i
+    elif ends == "ring":
+        like, first = 4 + 0 * i, i - 4
+    else:
+        near, far = i < 4, i >= m - 4
+        like, first = np.where(near, i, np.where(far, i - n + few, 4)), np.where(near, 0, np.where(far, n - few, i - 4))
+    columns = (first + np.arange(few)) % n
+    found = scipy.sparse.csr_array((block[like[:, 0]].ravel(), columns.ravel(), few * np.arange(m + 1)), shape=(m, n))
+    found.eliminate_zeros()
+    return found

@@ -41,8 +41,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 
-from discs.arrays import Complex, Float, Int
+from discs.arrays import Complex, Float, Int, Matrix
 from discs.chains.chain import Chain
 from discs.chains.rolling_discs import Assembly, folded
 
@@ -120,6 +121,39 @@ class Bends:
         """The force of viscosity, (2, n)."""
         turns, rate = self._rate(q, v)
         return self._at_discs(-(self.viscosity * rate)[:, None] * turns.conj())
+
+    def derivatives(self, kappa: Float, q: Float, v: Float) -> tuple[Matrix, Matrix]:
+        """The derivatives of `force` + `drag` by q and by v, sparse (3 n, 3 n): disc by disc of a bend, along x and along y."""
+        discs, _, slope, bend = self.stencil
+        z, z1 = self._line(q)
+        turns, rate = self._rate(q, v)
+        moves, n, k = (v[0] + 1j * v[1])[discs], self.chain.n, self.chain.k
+        moment, places = (self.stiffness * kappa)[:, None], np.arange(discs.size).reshape(discs.shape)
+        of_q, of_v = [], []
+        for row, step in enumerate((1, 1j)):
+            for slot in range(4):
+                dz, dz1 = step * slope[:, slot], step * bend[:, slot]
+                of_slope, of_bend = -dz1.conj(), dz.conj()
+                if not self.chain.link_law.quadratic:
+                    before, after = -(dz - 0.5 * k * dz1) / (z - 0.5 * k * z1) ** 2, -(dz + 0.5 * k * dz1) / (z + 0.5 * k * z1) ** 2
+                    of_slope, of_bend = (after - before) / k, 0.5 * (after + before)
+                turned = -1j * (of_slope[:, None] * slope + of_bend[:, None] * bend)
+                more = (turned * moves).real.sum(axis=1)
+                elastic = moment * (bend * (1j * dz)[:, None] - slope * (kappa * dz + 1j * dz1)[:, None])
+                drag = -self.viscosity[:, None] * (more[:, None] * turns.conj() + rate[:, None] * turned.conj())
+                own = -self.viscosity[:, None] * (turns[:, slot] * step).real[:, None] * turns.conj()
+                column = row * n + discs[places // 4, slot]
+                of_q.append((elastic + drag, column))
+                of_v.append((own, column))
+        return self._sparse(of_q), self._sparse(of_v)
+
+    def _sparse(self, parts: list[tuple[Complex, Int]]) -> Matrix:
+        """The matrix of forces on the discs of bends (B, 4), each with the columns that it belongs to, of the same shape."""
+        n, discs = self.chain.n, self.stencil[0]
+        values = np.concatenate([part.ravel() for forces, _ in parts for part in (forces.real, forces.imag)])
+        rows = np.concatenate([(a * n + discs).ravel() for _ in parts for a in (0, 1)])
+        columns = np.concatenate([column.ravel() for _, column in parts for _ in (0, 1)])
+        return scipy.sparse.csr_array((values, (rows, columns)), shape=(3 * n, 3 * n))
 
     def dissipated(self, q: Float, v: Float) -> float:
         """The power of viscosity."""

@@ -5,9 +5,10 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 
 from discs import checks
-from discs.arrays import Float
+from discs.arrays import Float, Matrix
 from discs.chains.elements import mixed
 from discs.loads import signals
 from discs.loads.bends import Bends
@@ -141,6 +142,31 @@ class Linear(Load):
         for drive in self.drives:
             found += _at(drive, t) * drive.pattern
         return found
+
+    def derivatives(self, t: float, q: Float, v: Float) -> tuple[Matrix, Matrix]:
+        of_q, of_v = (scipy.sparse.diags_array(-part.ravel(), format="csr") for part in (self.stiffness, self.damping))
+        if self.viscosity is not None:
+            of_v = of_v - self._viscous
+        if self.bends is not None:
+            bent, dragged = self.bends.derivatives(self._curvature(t), q, v)
+            of_q, of_v = of_q + bent, of_v + dragged
+        return of_q, of_v
+
+    @cached_property
+    def _viscous(self) -> Matrix:
+        """B^T (viscosity) B, sparse (rows n, rows n)."""
+        assert self.viscosity is not None
+        rows, n = self.constant.shape
+        links = np.arange(n + 1)
+        apart = scipy.sparse.csr_array((np.ones(n + 1), (links, links % n)), shape=(n + 1, n))
+        apart = apart - scipy.sparse.csr_array((np.ones(n + 1), (links, (links - 1) % n)), shape=(n + 1, n))
+        pulled = scipy.sparse.diags_array([-np.ones(n), np.ones(n)], offsets=[0, 1], shape=(n, n + 1))
+        if self.degree == 2:
+            mix = scipy.sparse.csr_array(self._mixed(np.eye(n + 1)).T)
+            apart, pulled = mix @ apart, pulled @ mix
+        none = scipy.sparse.csr_array((n, n))
+        blocks = [-(pulled @ scipy.sparse.diags_array(own) @ apart) for own in self.viscosity]
+        return scipy.sparse.block_diag([none] * (rows - len(blocks)) + blocks, format="csr")
 
     def power(self, t: float, q: Float, v: Float) -> tuple[float, float]:
         work = sum(_at(drive, t) * float(np.vdot(drive.pattern, v)) for drive in self.drives)

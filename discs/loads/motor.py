@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discs import checks
-from discs.arrays import Float
+from discs.arrays import Float, Matrix
 from discs.kernels.limits import HELD
 from discs.loads import signals
 from discs.loads.binding import Discs, OnRod, spread
@@ -96,6 +96,9 @@ class Held(Load):
         found = np.array(self.applied(t, q, v), dtype=float)
         found[self.where] += HELD * (self.rates(t) - v[self.where])
         return found
+
+    def derivatives(self, t: float, q: Float, v: Float) -> tuple[Matrix, Matrix]:
+        return self.other.derivatives(t, q, v)
 
     def potential(self, t: float, q: Float) -> float:
         return self.other.potential(t, q)

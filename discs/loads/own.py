@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 from numpy.typing import ArrayLike
 
 from discs import checks
-from discs.arrays import Float
+from discs.arrays import Float, Matrix
+from discs.differences import slope
 from discs.loads.binding import Discs, OnRod, spread
 from discs.skew import Load
 
@@ -94,6 +96,21 @@ class _Field(OwnLoad):
             raise ValueError(f"gradient of Potential must return dV/dx and dV/dy; got {checks.shown(found)} at t = {t:g}")
         f[0], f[1] = (-self.w * self._checked("gradient", part, q, t) for part in found)
         return f
+
+    def derivatives(self, t: float, q: Float, v: Float) -> tuple[Matrix, Matrix]:
+        """The force on a disc depends on its place only, so all discs are moved at once."""
+        rows, n = q.shape
+
+        def along(row: int) -> Float:
+            unit = np.zeros_like(q)
+            unit[row] = 1.0
+            return slope(lambda step: self.force(t, q + step * unit, v), float(np.abs(q[row]).max()) or 1.0)
+
+        parts = [along(row) for row in (0, 1)]
+        none = scipy.sparse.csr_array((rows * n, rows * n))
+        blocks = [[scipy.sparse.diags_array(part[a]) for part in parts] for a in (0, 1)]
+        corner = scipy.sparse.block_array(blocks)
+        return scipy.sparse.block_diag([corner, scipy.sparse.csr_array(((rows - 2) * n,) * 2)], format="csr"), none
 
     def _checked(self, name: str, values: ArrayLike, q: Float, t: float) -> Float:
         """Values (n,), finite where the positions are."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from discs.arrays import Float
+from discs.arrays import Float, Matrix
 from discs.loads.bends import Bends
 from discs.loads.linear import Linear, tabled
 from discs.loads.motor import Held
@@ -46,6 +46,10 @@ class Total(Load):
     def force(self, t: float, q: Float, v: Float) -> Float:
         found: Float = np.sum([load.force(t, q, v) for load in self.loads], axis=0)
         return found
+
+    def derivatives(self, t: float, q: Float, v: Float) -> tuple[Matrix, Matrix]:
+        found = [load.derivatives(t, q, v) for load in self.loads]
+        return sum(of_q for of_q, _ in found), sum(of_v for _, of_v in found)
 
     @cached_property
     def linear(self) -> Linear:

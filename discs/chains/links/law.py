@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from discs.arrays import Complex, Float
+from discs.chains.rolling_discs import Strains
 from discs.skew import Parameters, Secant
 
 if TYPE_CHECKING:
@@ -53,6 +54,9 @@ class LinkLaw(Protocol):
 
     def tension(self, secant: Secant) -> Float:
         """A discrete gradient of V over the step, (3, n_links): tension . change is the change of V."""
+
+    def strains(self, d: Float) -> Strains:
+        """The strains of all springs and their derivatives by q, as `RollingDiscs.strains` returns them."""
 
     def stiffness(self, secant: Secant, c: Float) -> Float:
         """Bands of C^T B^T (stiffness) B C, as `RollingDiscs.stiffness` returns them. They affect only the convergence of

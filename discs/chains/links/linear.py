@@ -9,7 +9,7 @@ import scipy  # its parts, slow to import, when they are used
 from discs.arrays import Complex, Float
 from discs.chains import stencils
 from discs.chains.links.law import LinkLaw
-from discs.chains.rolling_discs import folded
+from discs.chains.rolling_discs import Strains, folded
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.slaved_matrix import GHOST, RING, Matrix, assemble
@@ -59,6 +59,18 @@ class LinearCurvature(LinkLaw):
         tension[:2] = stencils.gathered(stencils.pull(moments, "springs"), self._ends)
         tension[2] = self.twist * secant[2]
         return tension
+
+    def strains(self, d: Float) -> Strains:
+        return self._strains
+
+    @cached_property
+    def _strains(self) -> Strains:
+        """Bends along x and along y, and twists."""
+        n, ends = self._n, self._ends
+        bend = stencils.matrix(lambda r: stencils.bends(stencils.links(r, ends), ends), n, ends)
+        twist = stencils.matrix(lambda theta: stencils.links(theta, ends), n, ends)
+        matrix = scipy.sparse.block_diag([bend, bend, twist], format="csr")
+        return Strains(matrix, np.concatenate([self.bend, self.bend, self.twist]), scipy.sparse.csr_array((3 * n, 3 * n)))
 
     def stiffness(self, secant: Float, c: Float) -> Float:
         if self._order is not None:

@@ -11,10 +11,12 @@ since d_0 x d_1 = M x D. The ends have no bending spring: the natural condition 
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy  # its parts, slow to import, when they are used
 
 from discs.arrays import Complex, Float
+from discs.chains import stencils
 from discs.chains.links.law import LinkLaw
-from discs.chains.rolling_discs import Assembly, folded
+from discs.chains.rolling_discs import Assembly, Strains, folded
 
 if TYPE_CHECKING:
     from discs.chains.chain import Chain
@@ -51,6 +53,7 @@ class TrueCurvature(LinkLaw):
     def __init__(self, chain: "Chain", rest: Float | float = 0.0) -> None:
         n, k = chain.n, chain.k
         self._rest, self._k, self._ring = rest, k, chain.ends == "ring"
+        self._n, self._ends = n, chain.ends
         self._bending = np.asarray(chain.bending_stiffness) * chain.bend_shares
         self._stretching = np.asarray(chain.stretch_stiffness) * k
         self._torsion = np.asarray(chain.torsion_stiffness) * k
@@ -102,6 +105,34 @@ class TrueCurvature(LinkLaw):
         tension[:2] = (turn * (before_bend - after_bend) + stretch * (self._stretching * (length / self._k - 1))) / self._k
         tension[2] = self._torsion * 0.5 * (before[2] + after[2]) / self._k**2
         return tension
+
+    def strains(self, d: Float) -> Strains:
+        """With grad arg d = J d/|d|^2 and grad |d| = d/|d|; their second derivatives are in the directions of both.
+
+        d^2 arg = -(J d d^T + d (J d)^T)/|d|^4 and d^2 |d| = J d (J d)^T/|d|^3.
+        """
+        n, k, length = self._n, self._k, np.hypot(d[0], d[1])
+        along = d[:2] / length
+        across = np.array([-along[1], along[0]])
+        link = stencils.matrix(lambda r: stencils.links(r, self._ends), n, self._ends)
+        none = scipy.sparse.csr_array(link.shape)
+        angle, longer = (
+            scipy.sparse.hstack([scipy.sparse.diags_array(a / size) @ link for a in u] + [none], format="csr")
+            for u, size in ((across, length), (along, np.ones_like(length)))
+        )
+        before, after = self._neighbours(np.arange(length.size))
+        matrix = scipy.sparse.vstack([angle[after] - angle[before], longer, scipy.sparse.hstack([none, none, link])]) / k
+        stiffness = np.concatenate([self._bending, self._stretching, self._torsion])
+        first, second = self._around(self._bending * (self._turning(d) - self._rest) / k)
+        turning, stretching = (second - first) / length**2, self._stretching * (length / k - 1) / (k * length)
+        parts = [
+            [turning * (across[a] * along[b] + along[a] * across[b]) + stretching * across[a] * across[b] for b in (0, 1)]
+            for a in (0, 1)
+        ]
+        blocks = [[link.T @ scipy.sparse.diags_array(part) @ link for part in row] for row in parts]
+        return Strains(
+            matrix.tocsr(), stiffness, scipy.sparse.block_diag([scipy.sparse.block_array(blocks), 0 * blocks[0][0]], format="csr")
+        )
 
     def stiffness(self, secant: Line, c: Float) -> Float:
         """Bends join a disc with its two neighbours, links join two discs."""
