@@ -58,8 +58,15 @@ STEERED = [Model(ends, "steered") for ends in ("springs", "ring")]
 ALL = SLAVED + TRUE + STEERED
 
 
-def models(kinds: list[Model]):
-    return pytest.mark.parametrize("model", kinds, ids=lambda m: f"{m.law}-{m.ends}")
+def longer(*values):
+    """Parameters of a test for the long suite only."""
+    return pytest.param(*values, marks=pytest.mark.long)
+
+
+def models(kinds: list[Model], short: list[Model] | None = None):
+    """Each model; if `short` is given, those not in it in the long suite only."""
+    marked = [m if short is None or m in short else longer(m) for m in kinds]
+    return pytest.mark.parametrize("model", marked, ids=[f"{m.law}-{m.ends}" for m in kinds])
 
 
 def models_and_engines(kinds: list[Model], plain: list[Model] | None = None):

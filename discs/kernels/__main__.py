@@ -1,7 +1,6 @@
 """`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it.
 
-With `--tested` those that the short suite runs: of the unit law and of discs with own headings not the explicit methods with fixed
-steps, and of chains side by side only the midpoint method with the field law.
+With `--tested` those that the short suite runs: the midpoint method for every chain, and all kinds of methods for one.
 """
 
 import argparse
@@ -31,13 +30,16 @@ def sharing(law: str, tested: bool = False) -> list[list[Integrator]]:
         if method.compiles:
             adaptive = type(method) if method.runs_whole else Integrator
             found.setdefault(type(method.parameters) if isinstance(method, FixedStep) else adaptive, []).append(method)
-    some = TESTED.get(law, METHODS) if tested else METHODS
+    some = TESTED[law] if tested else METHODS
     return [methods for methods in found.values() if any(method.name in some for method in methods)]
 
 
 KINDS = {"slaved": tuple(ROLLING), "own": ("own",)}  # of chains
-SOME = "midpoint", "gauss6", "DOP853"
-TESTED = {"own": SOME, "unit": SOME}  # by the short suite; of other chains all
+TESTED = {  # by the short suite
+    "field": ("midpoint", "gauss6", "rk4", "RK45", "DOP853"),
+    "unit": ("midpoint",),
+    "own": ("midpoint", "gauss6"),
+}
 SIZES = {"few": 9, "many": MANY}  # discs; many with slaved headings have kernels of their own, those in lanes
 
 

@@ -61,6 +61,7 @@ def test_steered_scene(tmp_path, capsys):
         assert re.search(rf"^ *{kind} +17 ", text, re.MULTILINE)
 
 
+@pytest.mark.long
 def test_closed_scene(tmp_path, monkeypatch, capsys):
     (tmp_path / "ring.toml").write_text('scene = "breathing_ring"\nomega = -0.3\nduration = 0.4\nradius = 0.7\n')
     out = tmp_path / "out"

@@ -9,6 +9,7 @@ from compare import lump
 from continuum import SteeredRod, solve, steered_rod
 from discs import simulate
 from discs.loads import Custom, Damping, Force, Motor, Rest, Slope, Spring, Torque, signals
+from tests.conftest import longer
 
 UNEVEN = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.8, "radius": 0.7, "length": 3.2}
 SMOOTH = signals.smooth(0.0, 1.0)
@@ -76,7 +77,7 @@ CASES = {
 
 
 @pytest.mark.slow  # kernels of chains
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [*map(longer, ("along", "points", "rest")), "motors", "wavy", "ring"])
 def test_chains_converge_to_the_loaded_field(case):
     """Chains share only the equations: order 2, and extrapolated to a tenth of their error."""
     scene = CASES[case]

@@ -51,6 +51,7 @@ def test_a_clamped_rod_on_a_slope_takes_its_static_shape(rolling):
     assert run.reaction[-1, 0] == pytest.approx(-PULL * LENGTH, rel=1e-4)
 
 
+@pytest.mark.long
 def test_a_clamped_rod_with_headings_of_its_own_takes_its_static_shape():
     """With the shear gamma = R theta' - phi: R G gamma' + beta theta'' + rho g R = 0 and K phi'' + G gamma = 0."""
     shear = 2.0

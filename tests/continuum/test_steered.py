@@ -219,6 +219,7 @@ def bumped(theta, omega=None, **options):
     return replace(rod, initial=lambda s: (s, rod.rod.radius * theta(s), theta(s), start(s), none(s), none(s)))
 
 
+@pytest.mark.long
 def test_narrow_bump_by_linear_waves():
     """A bump of width length/130, 1e-3 of its height asked for: exact waves of small amplitude, on a closed rod.
 

@@ -15,7 +15,7 @@ from discs.kernels.vectors import LANES
 from discs.running import abreast as running
 from discs.running import step_error
 from discs.running.part import Settings, parts_of
-from tests.conftest import SLAVED, Model, models, uneven
+from tests.conftest import SLAVED, Model, longer, models, uneven
 from tests.discs.test_kernels import dense_banded
 from tests.discs.test_simulate_many import cloud
 
@@ -53,7 +53,7 @@ def noted(monkeypatch):
     return counts
 
 
-@models(SLAVED)
+@models(SLAVED, [SLAVED[0], SLAVED[3], SLAVED[6]])
 @pytest.mark.parametrize("name", ["midpoint", "suzuki4", "gauss6", "radau5"])
 def test_side_by_side_is_one_by_one(model, name, kernels_as_python, noted):
     """Ten chains that differ in everything, in two bundles; converged, and after one sweep, where the matrix matters."""
@@ -195,7 +195,7 @@ def test_which_runs_go_side_by_side():
     assert [len(numbers) for numbers in parts(given, many)] == [256, 256, 188]
 
 
-@pytest.mark.parametrize("kind", [float, complex])
+@pytest.mark.parametrize("kind", [float, longer(complex)])
 def test_elimination_abreast(kind):
     """Each lane on its own."""
 

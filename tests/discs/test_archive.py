@@ -148,7 +148,7 @@ def memory(path, discs, frames, engine):
     return map(int, subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_memory_does_not_grow_with_frames(tmp_path):
     """A file of 130 MB, too large to be read whole, through a process that holds far less; a million discs: docs/archives.md."""
     (_, few), (_, many) = (memory(tmp_path / f"{frames}.nc", 20000, frames, "plain") for frames in (2, 202))
@@ -157,7 +157,7 @@ def test_memory_does_not_grow_with_frames(tmp_path):
     assert many - few < 0.1 * size
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_million_discs_take_less_than_a_gibibyte(tmp_path):
     """0.79 GiB, reckoned here from a fifth of them, 0.9 allowed; 12 frames make a file that is mapped as that of the million is."""
     (fixed, _), (used, _) = (memory(tmp_path / f"{discs}.nc", discs, 12, "compiled") for discs in (1000, 200_000))

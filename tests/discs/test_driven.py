@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from discs.mechanics import MechanicalSystem, driven, textbook
 from discs.mechanics.momentum import symmetry_momenta
+from tests.conftest import longer
 
 pytestmark = pytest.mark.slow  # each motion is integrated to 1e-10, and again by another method
 
@@ -80,6 +81,7 @@ def angular(q, v):
     )
 
 
+@pytest.mark.long
 def test_the_same_ball_by_its_three_angles():
     """Euler's angles instead of quasi-coordinates: M and A depend on q."""
     inertia, book = HOMOGENEOUS, BOOKS["ball on a turntable"]
@@ -145,7 +147,7 @@ def pushed_sleigh():
     return replace(book.system, applied=force), book, drives
 
 
-@pytest.mark.parametrize("method", ["auto", "RK45", "Radau", "LSODA"])
+@pytest.mark.parametrize("method", ["auto", longer("RK45"), longer("Radau"), longer("LSODA")])
 def test_a_pushed_and_damped_sleigh(method):
     """m (u. - a w^2) = F, (I + m a^2) w. + m a u w = moment, and the path (x, y, phi), integrated separately."""
     system, book, drives = pushed_sleigh()
@@ -167,6 +169,7 @@ def test_a_pushed_and_damped_sleigh(method):
     assert path.stats["method"] == ("DOP853" if method == "auto" else method)
 
 
+@pytest.mark.long
 def test_the_work_is_the_integral_of_the_power():
     system, book, _ = pushed_sleigh()
     path = system.integrate(book.q, book.v, np.linspace(0, 4, 401), progress=False)
@@ -175,6 +178,7 @@ def test_the_work_is_the_integral_of_the_power():
     assert path.work[-1] == pytest.approx(thirds @ power, abs=1e-8)
 
 
+@pytest.mark.long
 def test_a_bead_in_the_plane_on_a_wire_that_swings():
     """The wire's direction is a coordinate, psi. = W(t); -sin psi x. + cos psi y. = W (x cos psi + y sin psi) holds the bead on it.
 
@@ -222,7 +226,10 @@ def test_a_position_that_is_driven_does_not_drift():
     np.testing.assert_allclose(np.hypot(*path.q.T[:2]), 1, atol=1e-5)
 
 
-@pytest.mark.parametrize(("method", "bound"), [("auto", 1e-9), ("RK23", 1e-3), ("Radau", 1e-4), ("BDF", 1e-3), ("LSODA", 1e-4)])
+OTHERS = ("RK23", 1e-3), ("BDF", 1e-3), ("LSODA", 1e-4)
+
+
+@pytest.mark.parametrize(("method", "bound"), [("auto", 1e-9), ("Radau", 1e-4), *(longer(*other) for other in OTHERS)])
 def test_a_driven_and_damped_oscillator(method, bound):
     """m x.. + c x. + k x = F cos w t from rest at 0: the steady swing and a decaying free one."""
     m, c, k, f, w = 1.3, 0.4, 2.1, 0.8, 1.1
@@ -260,6 +267,7 @@ def test_a_short_push_is_found_with_a_shorter_step():
     assert path.v[-1, 0] == pytest.approx(0.01 * np.sqrt(np.pi), rel=1e-6)
 
 
+@pytest.mark.long
 def test_back_in_time():
     book = BOOKS["bead on a wire"]
     there = book.integrate([0.0, 2.0], progress=False)
@@ -294,8 +302,8 @@ TABLE = np.array([0.0, 0.8, 0.9, 0.1])
 @pytest.mark.parametrize(
     ("drive", "way"),
     [
-        pytest.param(lambda t, q: np.clip(t, 0, 1), 2.5, marks=pytest.mark.long),
-        (lambda t, q: np.interp(t, np.arange(4), TABLE), TABLE[:-1].sum() + (TABLE[-1] - TABLE[0]) / 2),
+        longer(lambda t, q: np.clip(t, 0, 1), 2.5),
+        longer(lambda t, q: np.interp(t, np.arange(4), TABLE), TABLE[:-1].sum() + (TABLE[-1] - TABLE[0]) / 2),
     ],
 )
 def test_a_drive_with_kinks(drive, way):
@@ -305,6 +313,7 @@ def test_a_drive_with_kinks(drive, way):
     assert balance(path) < 1e-6
 
 
+@pytest.mark.long
 def test_a_vakonomic_drive():
     """y. = sin x + t: the action of L + mu (y. - sin x - t), Euler-Lagrange x.. = -mu cos x and y. + mu = const."""
     system = MechanicalSystem.from_lagrangian(
@@ -323,7 +332,7 @@ def test_a_vakonomic_drive():
     assert balance(path) < 1e-9
 
 
-@pytest.mark.parametrize("method", ["RK45", "Radau", "BDF", "LSODA"])
+@pytest.mark.parametrize("method", ["RK45", longer("Radau"), longer("BDF"), "LSODA"])
 def test_every_method_takes_drives(method):
     book = BOOKS["ball on a turntable"]
     path = book.integrate([0, 1.0, 2.0], 1e-7, method=method, progress=False)

@@ -55,7 +55,7 @@ def both(problem, method, dt=0.02):
 MANY = HILLS, Damping(0.1), GUST, Torque(0.2, signals.sine(1.0, 2.0))
 
 
-@models(KINDS)
+@models(KINDS, KINDS[:1])
 def test_the_same_trajectory_on_both_engines(model, kernels_as_python):
     problem = replace(uneven(6, model), duration=0.3)
     loaded = replace(problem, loads=MANY)

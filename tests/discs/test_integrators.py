@@ -49,6 +49,7 @@ STEPS = {
     "mclachlan-perlmutter": (160, 320, 640),
 }
 SOME = [m for m in ALL if m.ends in ("consistent", "ring")] + STEERED[:1]
+QUICK = [m for m in SOME if m.law != "true"]  # chains with a compiled form
 
 
 def final(problem, method, steps, engine="compiled"):
@@ -71,7 +72,7 @@ def test_every_method_says_what_it_is(name):
     assert len(method.reference) > 20
 
 
-@models(SOME)
+@models(SOME, QUICK)
 @pytest.mark.parametrize("name", ["rk4"])
 def test_the_reference_of_the_orders(name, model):
     np.testing.assert_allclose(final(uneven(6, model), name, 2000), accurate(model), atol=2e-11)
@@ -88,7 +89,7 @@ def test_measured_order_is_the_declared_one(name, model, engine):
     assert orders == pytest.approx(find(name).order, abs=0.06 * find(name).order + 0.1), errors
 
 
-@models(SOME)
+@models(SOME, QUICK)
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_scipy_methods_follow_their_tolerance(name, model):
     problem = uneven(6, model)

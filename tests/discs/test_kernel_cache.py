@@ -13,6 +13,7 @@ from discs.integrators.rk4 import Explicit
 from discs.kernels import compiled, driver
 from discs.kernels.slaved import Slaved
 from discs.skew import Phase
+from tests.conftest import longer
 
 TINY = """
 from discs.kernels.compiled import kernel
@@ -36,7 +37,7 @@ print([(w.filename, w.lineno, str(w.message)[:31]) for w in told], tiny.twice(21
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("folder", ["", "cache", "nowhere/cache"])
+@pytest.mark.parametrize("folder", ["", *map(longer, ("cache", "nowhere/cache"))])
 def test_without_a_folder_for_the_cache(folder, tmp_path):
     """A read-only package and no home: __pycache__ is a file, which stops root too."""
     shutil.copytree(Path(compiled.__file__).parents[1], tmp_path / "discs", ignore=shutil.ignore_patterns("__pycache__"))

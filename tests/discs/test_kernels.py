@@ -15,7 +15,7 @@ from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
 from discs.kernels import banded, blocks, compiled, steered_links
 from discs.running import ready
-from tests.conftest import ALL, SLAVED, STEERED, Model, models, uneven
+from tests.conftest import ALL, SLAVED, STEERED, Model, longer, models, uneven
 
 pytestmark = pytest.mark.slow
 
@@ -189,7 +189,7 @@ class Compiling(Midpoint):
         return super().parameters
 
 
-@pytest.mark.parametrize("progress", [True, False])
+@pytest.mark.parametrize("progress", [True, longer(False)])
 @pytest.mark.parametrize("method", [Loading(), Compiling()])
 def test_compiling_is_announced_once(method, progress, monkeypatch, capsys):
     problem = uneven(5, Model("springs", "field"))

@@ -16,7 +16,7 @@ from discs.kernels.lean import lean
 from discs.kernels.slaved_lanes import MANY, Laned
 from discs.kernels.vectors import LANES, after, before, larger, largest, load, store, zero
 from discs.skew import Phase
-from tests.conftest import SLAVED, Model, models, uneven
+from tests.conftest import SLAVED, Model, longer, models, uneven
 from tests.discs.test_kernels import CLOSE, dense_banded
 from tests.discs.test_simulate import collapsing
 
@@ -83,7 +83,7 @@ def test_vectors_are_computed_all_lanes_at_once():
     assert "divsd" not in assembly
 
 
-@pytest.mark.parametrize("kind", [float, complex])
+@pytest.mark.parametrize("kind", [longer(float), complex])
 def test_elimination_in_lanes(kind):
     def solve(order, ring, corners, m, b):
         orders.factor(order, ring, corners, m)

@@ -53,7 +53,7 @@ def by_discs(problem: Problem, name: str, engine: str):
 
 
 @pytest.mark.slow
-@models(KINDS)
+@models(KINDS, [KINDS[1], KINDS[3]])
 def test_loads_move_discs_as_the_saddle_point_says(model, kernels_as_python):
     problem = loaded(model)
     expected, multipliers = by_multipliers(problem)

@@ -10,7 +10,7 @@ from compare import lump
 from continuum import steered_rod
 from discs import Chain, Midpoint, Problem, State, simulate
 from discs.loads import Damping, Linear, Potential, Rest, Slope, Torque, signals
-from tests.conftest import Model, uneven
+from tests.conftest import Model, longer, uneven
 from tests.discs.test_kinds_of_loads import every
 from tests.discs.test_loads import KINDS
 
@@ -182,7 +182,7 @@ def along_y(stiffness: float, problem: Problem):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["compiled", "plain"])
+@pytest.mark.parametrize("engine", ["compiled", longer("plain")])
 def test_the_balance_stays_exact_over_many_steps(engine, kernels_as_python):
     problem = uneven(4, Model("consistent", "field"))
     problem = replace(problem, loads=every(problem))

@@ -109,6 +109,7 @@ def test_two_particles_with_parallel_velocities():
     np.testing.assert_allclose(path.energy, path.energy[0], atol=1e-9)
 
 
+@pytest.mark.long
 def test_a_linear_constraint_written_otherwise():
     """phi = (A v)(1 + v.v) is 0 where A v is, with d phi/dv parallel to A; also the reduced form, and a helm besides."""
     book = textbook.chaplygin_sleigh(1.3, 0.4, 0.35, speed=0.9, turn_rate=1.7, heading=-0.6)
