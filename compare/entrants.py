@@ -9,7 +9,11 @@ import numpy as np
 from compare.peers import loads, multipliers, reduced
 from compare.peers.peer import Outcome, Peer
 from discs import Chain, Gauss4, Gauss6, Gauss8, Integrator, Midpoint, Problem, Radau3, Radau5, Solution, Suzuki4, simulate
+from discs.integrators import DOP853
 from discs.loads import Linear
+from discs.loads.motor import Held
+
+EXPLICIT = 128  # discs: with more, explicit methods take steps that are far too short
 
 
 def ours(problem: Problem) -> list[Peer]:
@@ -32,6 +36,10 @@ def ours(problem: Problem) -> list[Peer]:
     def to_tolerance(setting: float, seconds: float) -> Outcome:
         return at_the_end("auto", tol=setting)
 
+    def explicit(setting: float, seconds: float) -> Outcome:
+        return at_the_end(DOP853(setting, 0.1 * setting))
+
+    takes = problem.chain.n <= EXPLICIT and not isinstance(problem.system.load, Held)
     many = [round(6 * 2 ** (j / 2)) for j in range(17)]
     return [
         fixed("midpoint", many[2:], lambda m: Midpoint(tolerance=0.03 / m**2)),
@@ -41,6 +49,7 @@ def ours(problem: Problem) -> list[Peer]:
         fixed("gauss8", many[2:13], lambda m: Gauss8(tolerance=max(3e-4 / m**3, 1e-13))),
         fixed("radau3", many[2:13:2], lambda m: Radau3(tolerance=max(0.01 / m**3, 1e-13))),
         fixed("radau5", many[:13:2], lambda m: Radau5(tolerance=max(0.003 / m**3, 1e-13))),
+        *([Peer("DOP853", (1e-3, *(10.0 ** (-k / 2) for k in range(8, 21))), explicit)] if takes else []),
         Peer("auto", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), to_tolerance, "all attempts count; the setting is tol"),
     ]
 
@@ -80,6 +89,10 @@ def peers(problem: Problem) -> list[Peer]:
         return found
     if find_spec("sksundae"):
         found.append(multipliers.multiplier_peer(problem))
+    if find_spec("pydiffsol") and problem.chain.ends == "springs" and law in ("field", "unit", "own") and load is None:
+        from compare.peers.in_diffsl import diffsol_peers
+
+        found += diffsol_peers(problem)
     if find_spec("diffrax") and problem.chain.ends == "springs" and law in ("field", "unit", "own"):
         from compare.peers.in_jax import diffrax_peers
 

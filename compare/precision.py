@@ -16,7 +16,7 @@ from tqdm import tqdm
 from compare.entrants import ours, peers
 from compare.lump import lump
 from compare.peers.peer import Cutoff, Peer
-from compare.reference import distance, reference
+from compare.reference import distance, reference, rms_distance
 from compare.work_precision import Row, WorkPrecision
 from continuum import Scene, steered_rod, untwisting_rod
 from discs import Problem, SimulationError, checks
@@ -168,8 +168,10 @@ def _first_runs(peer: Peer, blank: Row, exact: Float, limit: float) -> list[_Ent
         off = distance(found.q, exact)
         tolerance = setting if setting < 1 else np.nan
         remark = "says it succeeded, and is wrong" if off > max(WRONG * tolerance, 0.01) else ""
-        row = row._replace(error=off, seconds=found.seconds, steps=found.steps or None, gradients=found.gradients)
-        add(row._replace(solves=found.solves, remark=remark))
+        row = row._replace(
+            error=off, rms=rms_distance(found.q, exact), seconds=found.seconds, steps=found.steps or None, gradients=found.gradients
+        )
+        add(row._replace(gradients=found.gradients, solves=found.solves, remark=remark))
         if clock.process_time() - started > 3 * limit and more:
             add(blank._replace(setting=setting, remark=f"tighter left out after {3 * limit:g} s"))
             break

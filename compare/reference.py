@@ -23,3 +23,9 @@ def distance(q: Float, exact: Float, sizes: Float | None = None) -> float:
     """
     size = (np.abs(exact).max(axis=1) if sizes is None else sizes)[:, None]
     return float((np.abs(q - exact) / np.where(size > 1e-12, size, 1.0)).max())
+
+
+def rms_distance(q: Float, exact: Float) -> float:
+    """The largest root mean square difference of a row, each relative to that of its values; absolute of a row that is zero."""
+    size = np.sqrt((exact**2).mean(axis=1))
+    return float((np.sqrt(((q - exact) ** 2).mean(axis=1)) / np.where(size > 1e-12, size, 1.0)).max())

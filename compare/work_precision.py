@@ -2,7 +2,9 @@
 
 import csv
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,7 +15,17 @@ from discs.arrays import Float
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "pydiffsol", "diffrax", "jax", "exudyn", "mujoco")
 ERRORS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+
+
+def versions() -> dict[str, str]:
+    """The versions of the packages that methods come from, of those that are installed."""
+    found: dict[str, str] = {}
+    for name in PACKAGES:
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 class Row(NamedTuple):
@@ -21,7 +33,8 @@ class Row(NamedTuple):
 
     error : largest error of positions and angles at the end, each relative to its largest value; NaN if there is none.
     seconds : processor time, median of the rounds, or mean of a long run's two times. steps, gradients, solves : counts, None if a
-    peer has none. remark : why there is no result, or what is wrong with it.
+    peer has none. remark : why there is no result, or what is wrong with it. rms : the error in the 2-norm, the largest root mean
+    square over the discs, each relative to that of its row.
     """
 
     problem: str
@@ -35,6 +48,11 @@ class Row(NamedTuple):
     gradients: int | None = None
     solves: int | None = None
     remark: str = ""
+    rms: float = np.nan
+
+    def off(self, rms: bool) -> float:
+        """The largest error, or that in the 2-norm."""
+        return self.rms if rms else self.error
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,30 +75,31 @@ class WorkPrecision:
         """The problems, by name and number of discs."""
         return list(dict.fromkeys((row.problem, row.n) for row in self.rows))
 
-    def curve(self, problem: str, n: int, method: str) -> tuple[Float, Float]:
+    def curve(self, problem: str, n: int, method: str, rms: bool = False) -> tuple[Float, Float]:
         """Errors and seconds of a method, from loose to tight, without runs that are slower and less accurate than another one."""
-        found = [(r.error, r.seconds) for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method) and r.error < 1]
+        mine = [r for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method)]
+        found = [(r.off(rms), r.seconds) for r in mine if r.off(rms) < 1]
         best = [(e, s) for e, s in found if not any(f <= e and t <= s and (f, t) != (e, s) for f, t in found)]
         errors, seconds = np.array(sorted(best, reverse=True)).reshape(-1, 2).T
         return errors, seconds
 
-    def time_at(self, error: float, problem: str, n: int, ours: bool) -> tuple[float, str]:
+    def time_at(self, error: float, problem: str, n: int, ours: bool, rms: bool = False) -> tuple[float, str]:
         """The least time in which any method reaches an error (log-log interpolation between its runs), and its name;
         infinite if none reaches it."""
         best = np.inf, ""
         for method in dict.fromkeys(r.method for r in self.rows if r.ours == ours):
-            errors, seconds = self.curve(problem, n, method)
+            errors, seconds = self.curve(problem, n, method, rms)
             if errors.size and errors[-1] <= error:
                 at = float(np.exp(np.interp(-np.log(error), -np.log(errors), np.log(seconds))))
                 best = min(best, (at, method))
         return best
 
-    def speedups(self, errors: Iterable[float] = ERRORS) -> str:
-        """Ratio of times, fastest peer over ours, at equal error, as a table."""
+    def speedups(self, errors: Iterable[float] = ERRORS, rms: bool = False) -> str:
+        """Ratio of times, fastest peer over ours, at equal error (largest, or in the 2-norm), as a table."""
         lines = ["| problem | N | error | ours | | fastest peer | | times |", "| --- " * 8 + "|"]
         for problem, n in self.problems:
             for error in errors:
-                (ours, mine), (peers, other) = self.time_at(error, problem, n, True), self.time_at(error, problem, n, False)
+                (ours, mine), (peers, other) = (self.time_at(error, problem, n, whose, rms) for whose in (True, False))
                 if not np.isfinite(ours):
                     continue
                 ratio = f"{peers / ours:.0f}" if np.isfinite(peers) else "no peer"
@@ -109,6 +128,9 @@ class WorkPrecision:
                 "# Speed against error",
                 f"Ours against the fastest peer at equal error. Reference: gauss8 with short steps, off by at most {floor:.1e}.",
                 self.speedups(),
+                "The same at equal error in the 2-norm:",
+                self.speedups(rms=True),
+                f"Versions: {', '.join(f'{name} {of}' for name, of in versions().items())}.",
                 *(f"* {name}: {how}." for name, how in self.differences.items()),
                 "All runs; errors relative to the largest value of each of x, y, θ (φ); times are processor time, medians, "
                 "of long runs means of two.",

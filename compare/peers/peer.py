@@ -36,3 +36,4 @@ class Peer(NamedTuple):
 
 
 TOLERANCES = tuple(10.0**-k for k in range(2, 12))
+THIRDS = tuple(10.0 ** (-k / 3) for k in range(5, 31))  # three in a decade: a method may miss an error narrowly at one of them

@@ -6,12 +6,13 @@ that a call has little overhead. Chains without a compiled form (true curvature)
 
 import time as clock
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from compare.peers import loads
-from compare.peers.peer import TOLERANCES, Cutoff, Outcome, Peer
+from compare.peers import loads, rates
+from compare.peers.peer import THIRDS, TOLERANCES, Cutoff, Outcome, Peer
 from discs import Problem
 from discs.arrays import Float
 from discs.integrators.ivp import Reduced
@@ -66,18 +67,19 @@ class Bound:
     Parameters
     ----------
     f : (t, y, out), None compiles one for the chain, which takes seconds and makes calls a third faster.
+    by_rate : the unknowns are omega instead of pi, see `compare.peers.rates`.
     """
 
-    def __init__(self, problem: Problem, f: Callable[[float, Float, Float], None] | None = None) -> None:
-        self.calls, self.until = 0, np.inf
+    def __init__(self, problem: Problem, f: Callable[[float, Float, Float], None] | None = None, by_rate: bool = False) -> None:
+        self.calls, self.until, self.by_rate = 0, np.inf, by_rate
         self.reduced = Reduced(problem.system)
         z = problem.start()
-        self.y0 = self.reduced.join(z.hi, z.pi)
         mass, _, spin = problem.system.weights[:3]
-        share = np.sqrt(np.where(spin > 0, spin, mass))
+        self.y0 = self.reduced.join(z.hi, np.array(problem.initial.omega) if by_rate else z.pi)
         # pi of a disc scales like the root of its share of the length, and so do the allowed errors
+        share = np.ones_like(mass) if by_rate else np.sqrt(np.where(spin > 0, spin, mass))
         self.unit = self.reduced.join(np.ones_like(z.hi), np.ones_like(z.pi) * share)
-        self.f = f or bound(problem, self.y0)
+        self.f = f or (rates.bound if by_rate else bound)(problem, read_only(self.y0) if by_rate else self.y0)
         self(0.0, self.y0)  # compiled before anything is timed
 
     def start(self, seconds: float) -> None:
@@ -135,17 +137,41 @@ def banded(problem: Problem, width: int) -> dict[str, Any]:
     return {"linsolver": "dense"} if problem.system.closed else {"linsolver": "band", "lband": width, "uband": width}
 
 
+def band(problem: Problem, f: Bound) -> dict[str, Any]:
+    """As `banded`, with both half-bandwidths of the Jacobian found by changing unknowns at both ends and in the middle."""
+    options = banded(problem, f.reduced.width)
+    if problem.system.closed:
+        return options
+    width, size = f.reduced.width, f.y0.size
+    y = f.y0 + 1e-3 * np.random.default_rng(1).standard_normal(size)
+    lower = upper = 0
+    for first in {0, max(0, size // 2 - width), max(0, size - 2 * width)}:
+        for j in range(first, min(size, first + 2 * width)):
+            changed = y.copy()
+            changed[j] += 1e-3
+            (found,) = np.nonzero(f(0.0, changed) - f(0.0, y))
+            lower, upper = max(lower, int(found.max(initial=j)) - j), max(upper, j - int(found.min(initial=j)))
+    return options | {"lband": lower, "uband": upper}
+
+
 def sundials_peers(problem: Problem, f: Bound) -> list[Peer]:
-    """CVODE with a banded Jacobian by differences: BDF to order 2 and 5, Adams."""
+    """CVODE with a banded Jacobian by differences: BDF to order 2 and 5, Adams.
+
+    BDF to order 2, the fastest of them for these chains, also with larger absolute tolerances and, where that differs, with the
+    rates as unknowns. Its error is not a smooth function of the tolerance: three tolerances in a decade.
+    """
     from sksundae.cvode import CVODE
 
-    band = banded(problem, f.reduced.width)
+    options_of: dict[int, dict[str, Any]] = {}
 
-    def runner(**options: Any) -> Callable[[float, float], Outcome]:
+    def runner(of: Callable[[], Bound], atol: float = 0.01, **options: Any) -> Callable[[float, float], Outcome]:
         def run(rtol: float, seconds: float) -> Outcome:
+            f = of()
+            if id(f) not in options_of:
+                options_of[id(f)] = band(problem, f)
             f.start(seconds)
             begun = clock.process_time()
-            solver = CVODE(f.fill, rtol=rtol, atol=0.01 * rtol * f.unit, max_num_steps=10**8, **options, **band)
+            solver = CVODE(f.fill, rtol=rtol, atol=atol * rtol * f.unit, max_num_steps=10**8, **options, **options_of[id(f)])
             found = solver.solve(np.array([0.0, problem.duration]), f.y0)
             spent = clock.process_time() - begun
             if spent > seconds:
@@ -153,12 +179,22 @@ def sundials_peers(problem: Problem, f: Bound) -> list[Peer]:
             if not found.success:
                 raise ArithmeticError(str(found.message))
             end = f.reduced.split(found.y[-1])
-            return Outcome(end.hi, 0, f.calls, int(found.njev or 0), spent, end.pi)
+            return Outcome(end.hi, 0, f.calls, int(found.njev or 0), spent, None if f.by_rate else end.pi)
 
         return run
 
+    @cache
+    def by_rate() -> Bound:
+        return Bound(problem, by_rate=True)
+
+    second: dict[str, Any] = {"method": "BDF", "max_order": 2}
+    found = [Peer("CVODE BDF-2", THIRDS, runner(lambda: f, **second))]
+    for share in (0.1, 1.0):
+        found.append(Peer(f"CVODE BDF-2, atol {share:g} rtol", THIRDS, runner(lambda: f, share, **second)))
+        if rates.takes(problem):
+            found.append(Peer(f"CVODE BDF-2 for rates, atol {share:g} rtol", THIRDS, runner(by_rate, share, **second)))
     return [
-        Peer("CVODE BDF-2", TOLERANCES, runner(method="BDF", max_order=2)),
-        Peer("CVODE BDF-5", TOLERANCES, runner(method="BDF", max_order=5)),
-        Peer("CVODE Adams", TOLERANCES, runner(method="Adams")),
+        *found,
+        Peer("CVODE BDF-5", TOLERANCES, runner(lambda: f, method="BDF", max_order=5)),
+        Peer("CVODE Adams", TOLERANCES, runner(lambda: f, method="Adams")),
     ]

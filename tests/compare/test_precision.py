@@ -9,15 +9,17 @@ import pytest
 from compare import lump, work_precision
 from compare.__main__ import main
 from compare.entrants import ours, peers
-from compare.peers import reduced
+from compare.peers import rates, reduced
+from compare.peers.in_diffsl import diffsol_peers
 from compare.peers.peer import Cutoff, Outcome, Peer
-from compare.reference import distance, reference
+from compare.reference import distance, reference, rms_distance
 from compare.work_precision import Row, WorkPrecision
 from continuum import untwisting_rod
 from discs import Problem
+from discs.integrators.ivp import Reduced
 from discs.kernels import driver
 from discs.loads import Damping, Force, Motor, Rest, Slope, Spring, Torque, signals
-from tests.conftest import Model, longer, uneven
+from tests.conftest import Model, models, uneven
 
 pytestmark = pytest.mark.slow
 
@@ -43,24 +45,77 @@ SHORT = {
 BOUND = {"IDA, multipliers": 1e-3, "Exudyn, generic": 3e-4, "Exudyn, wheels and beams": 3e-4, "MuJoCo, friction, damped": 3e-2}
 
 
-@pytest.mark.parametrize(("name", "quick"), [("uneven", True), *(longer(name, False) for name in SHORT)])
-def test_peers_solve_the_same_problem(name, quick):
+def test_peers_take_the_loaded_equations():
+    problem = SHORT["uneven"]
+    exact, plain = reference(problem)[0], Reduced(problem.system)
+    f = reduced.Bound(problem, lambda t, y, out: np.copyto(out, plain(t, y)))
+    found = reduced.scipy_peers(problem, f) + (reduced.sundials_peers(problem, f) if find_spec("sksundae") else [])
+    for peer in found:
+        if "rates" not in peer.name:  # compiled
+            assert distance(peer.run(1e-5, 60.0).q, exact) < 1e-3, peer.name
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SHORT)
+def test_peers_solve_the_same_problem(name):
     problem: Problem = SHORT[name]
     exact, floor = reference(problem)
     assert floor < 1e-11
     found = peers(problem)
     names = {peer.name for peer in found}
     exudyn = "Exudyn, wheels and beams" if "own" in name else "Exudyn, generic"
+    assert not any(name.startswith("diffsol") for name in names) or not problem.loads
     for module, peer in (("scipy", "SciPy Radau"), ("sksundae", "CVODE BDF-2"), ("diffrax", "diffrax Tsit5"), ("exudyn", exudyn)):
         written = ("true" not in name or module in ("scipy", "sksundae")) and (name, module) != ("loaded own", "exudyn")
         assert (written and find_spec(module) is not None) == (peer in names)
     for peer in [*found, *ours(problem)]:
-        if quick and "XLA" in peer.tells:
-            continue  # takes long to compile
         setting = 1e-6 if 1e-6 in peer.settings else peer.settings[3 if peer in found else -1]  # a tolerance or a step
         q = peer.run(setting, 60.0).q
         error = (np.abs(q - exact).max(axis=1) / np.abs(exact).max(axis=1)).max()
         assert error < BOUND.get(peer.name, 1e-4), (peer.name, setting, error)
+
+
+@pytest.mark.skipif(find_spec("pydiffsol") is None, reason="pydiffsol is not installed")
+@models([Model("springs", law) for law in ("field", "unit", "steered")])
+def test_diffsol_solves_the_same_problem(model):
+    problem = uneven(7, model)
+    exact, _ = reference(problem)
+    for peer in diffsol_peers(problem):
+        assert distance(peer.run(1e-6, 60.0).q, exact) < 1e-4, peer.name
+        assert distance(peer.run(1e-8, 60.0).q, exact) < 5e-6, peer.name
+
+
+@pytest.mark.long
+def test_rates_as_unknowns_obey_the_same_equations():
+    """(q, omega) by the chain rule from (q, pi), by central differences of omega = pi / root along the motion."""
+    problem = replace(uneven(6, Model("springs", "field")), loads=LOADS)
+    by_momenta, by_rates = reduced.Bound(problem), reduced.Bound(problem, by_rate=True)
+    assert rates.takes(problem)
+    system, y, h = problem.system, by_momenta.y0, 1e-6
+
+    def omega(y):
+        z = by_momenta.reduced.split(y)
+        return system.forward(system.basis(system.shape(z.hi)), z.pi)[2]
+
+    rate = by_momenta(0.3, y)
+    expected, found = by_momenta.reduced.split(rate).hi, by_momenta.reduced.split(by_rates(0.3, by_rates.y0))
+    np.testing.assert_allclose(found.hi, expected, atol=1e-14)
+    np.testing.assert_allclose(found.pi, (omega(y + h * rate) - omega(y - h * rate)) / (2 * h), atol=1e-8)
+
+
+def test_the_band_of_the_jacobian_is_found():
+    problem = uneven(9, Model("springs", "steered"))
+    plain = Reduced(problem.system)
+    f = reduced.Bound(problem, lambda t, y, out: np.copyto(out, plain(t, y)))
+    jacobian = np.array([(f(0.0, f.y0 + 1e-6 * unit) - f(0.0, f.y0 - 1e-6 * unit)) for unit in np.eye(f.y0.size)]).T
+    rows, columns = np.nonzero(np.abs(jacobian) > 1e-14)
+    band = reduced.band(problem, f)
+    assert (band["lband"], band["uband"]) == ((rows - columns).max(), (columns - rows).max())
+
+
+def test_the_error_in_the_2_norm():
+    exact, found = np.array([[3.0, 4.0], [0.0, 0.0]]), np.array([[3.0, 4.5], [0.0, 1e-3]])
+    assert rms_distance(found, exact) == pytest.approx(0.1)
 
 
 def test_loads_that_peers_do_not_take_are_refused():
