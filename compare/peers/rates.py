@@ -15,6 +15,7 @@ import numpy as np
 from compare.peers import loads
 from discs import Chain, Problem
 from discs.arrays import Float
+from discs.skew import Phase
 
 
 def takes(problem: Problem) -> bool:
@@ -34,7 +35,6 @@ def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
     from discs.kernels.compiled import jit
     from discs.kernels.lean import lean
     from discs.kernels.shared import forward
-    from discs.skew import Phase
 
     chain = problem.system.parameters
     rows, n = chain.scale.size, chain.weights.shape[1]
