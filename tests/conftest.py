@@ -69,12 +69,16 @@ def models(kinds: list[Model], short: list[Model] | None = None):
     return pytest.mark.parametrize("model", marked, ids=[f"{m.law}-{m.ends}" for m in kinds])
 
 
-def models_and_engines(kinds: list[Model], plain: list[Model] | None = None):
-    """Each model with the compiled twin where there is one, and with the plain one, which may be tried on fewer or on more."""
+def models_and_engines(kinds: list[Model], plain: list[Model] | None = None, short: list[Model] | None = None):
+    """Each model with the compiled twin where there is one, and with the plain one, which may be tried on fewer or on more.
+
+    If `short` is given, the plain one runs with other models in the long suite only.
+    """
     pairs = [(m, "compiled") for m in kinds if m.law != "true"]
     every = dict.fromkeys([*kinds, *(plain or [])])
     pairs += [(m, "plain") for m in every if plain is None or m in plain or m.law == "true"]
-    return pytest.mark.parametrize(("model", "engine"), pairs, ids=[f"{m.law}-{m.ends}-{engine}" for m, engine in pairs])
+    marked = [pair if short is None or pair[1] == "compiled" or pair[0] in short else longer(*pair) for pair in pairs]
+    return pytest.mark.parametrize(("model", "engine"), marked, ids=[f"{m.law}-{m.ends}-{engine}" for m, engine in pairs])
 
 
 def uneven(n: int, model: Model, seed: int = 1, *, equal: bool = False) -> Problem:

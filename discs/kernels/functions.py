@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from numba import types
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
@@ -68,11 +69,18 @@ GIVEN = SHARES, types.float64, ROWS, ROWS
 
 
 @lru_cache(KEPT)
-def addresses(pairs: tuple[tuple[Any, Any], ...]) -> tuple[Any, Any]:
+def addresses(pairs: tuple[tuple[Any, Any], ...]) -> tuple[Any, Any] | None:
     """Sums of forces and of powers, as kernels call them. A force that raises, or of another shape, is NaN, which stops the run.
 
-    NumbaError for functions that numba cannot compile, or that return something else.
+    None for functions that numba cannot compile, or that return something else.
     """
+    try:
+        return _compiled(pairs)
+    except NumbaError:
+        return None
+
+
+def _compiled(pairs: tuple[tuple[Any, Any], ...]) -> tuple[Any, Any]:
     force, power = (added(functions) for functions in zip(*pairs, strict=True))
 
     @numba.cfunc(ROWS(*GIVEN))

@@ -46,22 +46,17 @@ class Potential(OnRod):
 
 
 def for_kernels(make: str, functions: tuple[Any, ...], *options: Any) -> tuple[Any, Any] | None:
-    """Force and power by the function of this name in `discs.kernels.functions`; None unless numba compiles all functions."""
+    """Force and power by the function of this name in `discs.kernels.functions`; None unless all functions are numba's."""
     given = [function for function in functions if function is not None]
     if "numba" not in sys.modules:
         return None
     from numba.core.dispatcher import Dispatcher
-    from numba.core.errors import NumbaError
 
     if not all(isinstance(function, Dispatcher) for function in given):
         return None
     from discs.kernels import functions as kernels
 
     pair: tuple[Any, Any] = getattr(kernels, make)(*functions, *options)
-    try:
-        kernels.addresses((pair,))
-    except NumbaError:
-        return None
     return pair
 
 
@@ -76,6 +71,16 @@ class OwnLoad(Load):
     @abstractmethod
     def functions(self) -> tuple[Any, Any] | None:
         """Force and power for compiled code, or None."""
+
+    @property
+    def compiles(self) -> bool:
+        """Whether numba compiles its functions, which takes seconds; in runs they are compiled with those of other loads."""
+        functions = self.functions
+        if functions is None:
+            return False
+        from discs.kernels import functions as kernels
+
+        return kernels.addresses((functions,)) is not None
 
 
 class _Field(OwnLoad):

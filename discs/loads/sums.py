@@ -64,7 +64,8 @@ class Total(Load):
             return None
         from discs.kernels import functions as kernels  # numba is slow to import
 
-        return kernels.Functions(linear, own[0].w, *kernels.addresses(tuple(functions)), linear.spent)
+        found = kernels.addresses(tuple(functions))
+        return found and kernels.Functions(linear, own[0].w, *found, linear.spent)
 
     @property
     def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]

@@ -25,7 +25,7 @@ def plain_because(problem: Problem, integrator: Integrator, engine: str, want: t
         return ""
     for given, load in zip(problem.loads, problem.bound, strict=True):
         name = type(given).__name__
-        if isinstance(load, OwnLoad) and load.functions is None:
+        if isinstance(load, OwnLoad) and not load.compiles:
             return f"the functions of {name} are not compiled by numba, as with numba.njit"
         if not isinstance(load, OwnLoad) and load.parameters is None:
             return f"{name} has no compiled form here"

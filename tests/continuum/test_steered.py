@@ -176,9 +176,8 @@ def test_no_limit_on_the_step_from_stiff_links():
         simulate(problem, "rk4", 0.01, progress=False, engine="plain")
 
 
-@pytest.mark.parametrize(
-    "parameters", [pytest.param({}, marks=pytest.mark.long), {"stretch_stiffness": 5.0, "density": 1.3, "radius": 0.7}]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("parameters", [{}, {"stretch_stiffness": 5.0, "density": 1.3, "radius": 0.7}])
 def test_true_curvature_converges_at_order_two_with_either_end(parameters):
     scene = untwisting_rod("unit", curvature="true", **parameters)
     field = solve(scene, 1e-4, frames=2, progress=False)

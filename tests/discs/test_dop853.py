@@ -5,13 +5,13 @@ import pytest
 
 from discs import SimulationError, simulate
 from discs.integrators import DOP853
-from tests.conftest import Model, uneven
+from tests.conftest import Model, models, uneven
 
 pytestmark = pytest.mark.filterwarnings("ignore:DOP853. energy is conserved")  # tolerances are large on purpose
 NAMES = ("x", "y", "theta", "omega", "energy", "rolling_residual")
 
 
-@pytest.mark.parametrize("model", [Model("springs", "field"), Model("ring", "unit"), Model("springs", "steered")], ids=str)
+@models([Model("springs", "field"), Model("ring", "unit"), Model("springs", "steered")], [Model("springs", "field")])
 def test_whole_runs_are_those_of_scipy(model):
     """Frames at the start, several in one step, one beyond a step; tolerances at which steps are repeated, too."""
     problem = uneven(7, model)

@@ -10,7 +10,7 @@ from discs import Gauss4, Midpoint, Radau3, simulate
 from discs.integrators import METHODS
 from discs.kernels import compiled
 from discs.loads import Custom, Damping, Motor, Potential, Torque, signals
-from tests.conftest import models, uneven
+from tests.conftest import longer, models, uneven
 from tests.discs.test_loads import KINDS
 
 pytestmark = pytest.mark.slow  # numba compiles functions
@@ -109,7 +109,9 @@ def not_finite(t, q, v):
     ("force", "words"),
     [
         (raising, "force of Custom raised ValueError: too late at t = 0.3"),
-        (not_finite, r"Custom: the force must be finite numbers of shape \(3, 6\); got values that are not finite at t = 0.3"),
+        longer(
+            not_finite, r"Custom: the force must be finite numbers of shape \(3, 6\); got values that are not finite at t = 0.3"
+        ),
     ],
 )
 def test_a_bad_force_is_named_with_its_time_as_on_the_plain_engine(force, words, kernels_as_python):

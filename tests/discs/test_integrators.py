@@ -49,6 +49,7 @@ STEPS = {
     "mclachlan-perlmutter": (160, 320, 640),
 }
 SOME = [m for m in ALL if m.ends in ("consistent", "ring")] + STEERED[:1]
+PLAIN = [Model("springs", "field"), Model("consistent", "unit"), Model("ring", "true"), Model("springs", "steered")]
 QUICK = [m for m in SOME if m.law != "true"]  # chains with a compiled form
 
 
@@ -78,7 +79,7 @@ def test_the_reference_of_the_orders(name, model):
     np.testing.assert_allclose(final(uneven(6, model), name, 2000), accurate(model), atol=2e-11)
 
 
-@models_and_engines(SOME, plain=SOME[::4])
+@models_and_engines(SOME, plain=SOME[::4], short=QUICK)
 @pytest.mark.parametrize("name", FIXED)
 def test_measured_order_is_the_declared_one(name, model, engine):
     if name == "gauss8" and model == Model("ring", "unit"):
@@ -98,7 +99,7 @@ def test_scipy_methods_follow_their_tolerance(name, model):
     assert errors[2] < 3e-8
 
 
-@models_and_engines(ALL)
+@models_and_engines(ALL, short=PLAIN)
 @pytest.mark.parametrize("name", COMPOSED + GAUSS)
 def test_energy_is_exact(name, model, engine):
     if name in GAUSS and model.law in ("true", "steered"):
@@ -107,7 +108,7 @@ def test_energy_is_exact(name, model, engine):
     np.testing.assert_allclose(run.energy, run.energy[0], rtol=1e-12)
 
 
-@models_and_engines(SLAVED)
+@models_and_engines(SLAVED, short=PLAIN)
 @pytest.mark.parametrize("name", COMPOSED)
 def test_energy_is_exact_even_with_one_sweep(name, model, engine):
     loose = Midpoint(sweeps=1, tolerance=0)
@@ -117,14 +118,14 @@ def test_energy_is_exact_even_with_one_sweep(name, model, engine):
     assert run.stats["unconverged"] == 0  # all the sweeps that were asked for
 
 
-@models_and_engines(ALL)
+@models_and_engines(ALL, short=PLAIN)
 @pytest.mark.parametrize("name", ["rk4"])
 def test_energy_test_can_fail(name, model, engine):
     run = simulate(uneven(9, model), name, 0.02, progress=False, engine=engine)
     assert np.ptp(run.energy) > 1e-9 * run.energy[0]
 
 
-@models_and_engines(ALL, plain=ALL[::3])
+@models_and_engines(ALL, plain=ALL[::3], short=PLAIN)
 @pytest.mark.parametrize("name", [*COMPOSED, *GAUSS, "mclachlan-perlmutter"])
 def test_reversal(name, model, engine):
     """The motion back from the end, rates reversed, leads to the start."""
@@ -147,7 +148,7 @@ def test_reversal(name, model, engine):
     assert there_and_back(Midpoint(sweeps=1, tolerance=0)) > 1e-9  # a control
 
 
-@models_and_engines(ALL)
+@models_and_engines(ALL, short=PLAIN)
 @pytest.mark.parametrize("name", FIXED)
 def test_rolling_residual_is_round_off_in_every_frame(name, model, engine):
     dt = 0.05 if find(name).stability_limit == np.inf else 0.004
@@ -155,7 +156,7 @@ def test_rolling_residual_is_round_off_in_every_frame(name, model, engine):
     assert run.rolling_residual.max() < 1e-13
 
 
-@models_and_engines(ALL)
+@models_and_engines(ALL, short=PLAIN)
 def test_midpoint_steps_roll_without_sliding(model, engine):
     """From the frames alone: r_{n+1} - r_n = e(midpoint) (theta_{n+1} - theta_n) over every step."""
     problem = uneven(9, model)
@@ -166,7 +167,7 @@ def test_midpoint_steps_roll_without_sliding(model, engine):
         np.testing.assert_allclose((b - a)[:2], e * (b - a)[2], atol=1e-13)
 
 
-@models_and_engines(ALL)
+@models_and_engines(ALL, short=PLAIN)
 @pytest.mark.parametrize("name", ["mclachlan-perlmutter"])
 def test_perlmutter_steps_are_the_published_equations(name, model, engine):
     """q_h - q_0 = h/2 v_0, q_1 - q_h = h/2 v_1, and M (v_1 - v_0) + h grad V(q_h) is a ground force at q_h: no power in

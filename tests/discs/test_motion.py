@@ -141,7 +141,7 @@ BOOKS = {**CLOSED, "contact": contact(), "driven": driven(0.6)}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("power", [longer(-6), 6])
-@pytest.mark.parametrize("name", BOOKS)
+@pytest.mark.parametrize("name", [name if i % 3 == 0 else longer(name) for i, name in enumerate(BOOKS)])
 def test_units_of_length_mass_and_time_do_not_matter(name, power):
     book, length, time = BOOKS[name], 10.0**power, 10.0 ** (-power / 2)
     angles = [n in ("theta", "phi") for n in book.system.names]
