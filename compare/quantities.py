@@ -12,6 +12,10 @@ With lambda_i the force on disc i, w_i its share of the length, and the limit of
 
 All but the first two are relative to the largest value in the field at that time.
 
+The limit of the end force needs the field's force per length near the end, whose own error is largest there. The field shows it:
+contact_moments are computed without that force, and cos(0) + cos(pi s/length) sees one end, cos(0) - cos(pi s/length) the other. By
+half as much the parts and the moments differ (`_defect`), and this is added to the field's estimated error of the end force.
+
 The energy per length of discs of order four is that of their elements, the mean over each, whose sum is the energy of the chain; it
 is compared with the field's mean over the same element.
 
@@ -25,6 +29,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from continuum import Scene
+from continuum.ground import weights
 from continuum.load_places import point_loads
 from continuum.solver import spline
 from continuum.wants import INSIDE, smooth_tests
@@ -90,7 +95,8 @@ class Limit:
             for name, array in (("force weak", "contact_moments"), ("end force", "end_force"), ("end couple", "end_couple")):
                 if (found := getattr(field, array)) is not None and not (name == "end couple" and scene.steered):
                     self._values[name] = found[-1]
-                    floors[name] = estimate[array] / _size(found[-1])
+                    more = _defect(field) if name == "end force" else 0.0
+                    floors[name] = (estimate[array] + more) / _size(found[-1])
         self._splines = {name: spline(scene, field.s, self._values[name]) for name in want}
         self.names, self.floors = tuple(floors), tuple(floors.values())
         self.of_discs = tuple(dict.fromkeys("velocity" if name == "energy_density" else name for name in want))
@@ -131,6 +137,17 @@ class Limit:
             if "end couple" in self._values:
                 found["end couple"] = _largest(ends.couple[0], self._values["end couple"])
         return found
+
+
+def _defect(field: Solution) -> float:
+    """What the force inside and the end forces of a field with free ends lack of its moments, the largest at an end."""
+    assert field.contact_force is not None
+    assert field.contact_moments is not None
+    assert field.end_force is not None
+    eta = smooth_tests(field.s, field.s[-1], False)[0, :2]  # without slope at the ends, so without couples
+    parts = field.contact_force[-1] @ (eta * weights(field.s, False)).T + field.end_force[-1].T @ eta[:, [0, -1]].T
+    whole, between = (parts - field.contact_moments[-1][:, :2]).T
+    return float(np.abs([whole + between, whole - between]).max()) / 2
 
 
 def energy_density(scene: Scene, run: Solution) -> Float:

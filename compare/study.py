@@ -45,7 +45,7 @@ def convergence(
     sizes, problems = checked_sizes(scene, n, ends, degree)
     want = check_want(want, scene)
     if field is None:
-        field = solve(scene, tol, frames=2, progress=progress, want=want)
+        field = solve(scene, tol, frames=1, progress=progress, want=want)
     if field.error_estimate is None or not np.isclose(field.t[-1], scene.duration, rtol=1e-12):
         raise ValueError(
             f"field must be solve(scene, tol) of this scene up to t = {scene.duration:g}, with an error estimate; got {field!r}"

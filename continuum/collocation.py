@@ -120,6 +120,13 @@ def between(values: Float, parts: Float) -> Float:
     return found
 
 
+def rolling(h: float, v: Float, part: float) -> Float:
+    """omega and omega. at a fraction of a step of length h, (2, n), by the polynomial through omega at its stages."""
+    nodes, _ = legendre.leggauss(len(v))
+    series = np.linalg.solve(legendre.legvander(nodes, len(v) - 1), v[:, 2])
+    return np.stack([legendre.legval(2 * part - 1, c) for c in (series, 2 / h * legendre.legder(series))])
+
+
 @cache
 def _polynomials(stages: int) -> tuple[Float, Float]:
     """Legendre coefficients, (stages + 1, stages), of int_0^tau l_j and of L_j."""

@@ -70,14 +70,23 @@ class Ground:
         stiffness = self._nodes.torsion_stiffness
         self._stiffer = stiffness @ self._field[1] if stiffness.ndim else 0.0  # beta'
 
-    def at(self, t: Float, z: Phase, ends: tuple[Float, Float] | None = None) -> dict[str, Float]:
+    def at(
+        self,
+        t: Float,
+        z: Phase,
+        ends: tuple[Float, Float] | None = None,
+        rolling: Float | None = None,
+        torques: Float | None = None,
+    ) -> dict[str, Float]:
         """The quantities at times (k,) and states with a first axis k.
 
         ends : the parts of K r'' and of its derivative along r' at the two ends, over |r'|, (k, 2), if they are known.
+        rolling, torques : omega and omega. at the nodes, (2, k, n), and the torques of motors, (k, motors); without `rolling` those
+            of the states and of Galerkin's equations.
         """
         rod, want, here, field = self._rod, self._want, self._here, self._field
         q = z.hi + z.lo
-        omega = rod.omega(z)
+        omega = rod.omega(z) if rolling is None else rolling[0]
         a: Complex = q[:, 0] + 1j * q[:, 1]
         slope, bend = a @ self._line[1] + rod.shift, a @ self._line[2]
         h, h1, _ = rod.law.jet(slope, bend, 0 * bend)
@@ -102,7 +111,7 @@ class Ground:
             found["energy_flux"] = -(_dot(contact, v) + _dot(moment, turning) + torsion * rate)
         if "contact_force" not in want:
             return found
-        spin, reaction = self._spins(t, z, omega)
+        spin, torques = self._spins(t, z, omega) if rolling is None else (rolling[1], torques)
         r = a @ self._line[0] + rod.shift * self._s
         faster = 1j * _vector(rod.law.rate(_pair(slope), _pair(turning))) * w + e * ((self._nodes.radius * spin) @ field[0])
         free = here.density * faster - self._loads.force(t, r)
@@ -121,6 +130,9 @@ class Ground:
         if ends is not None:
             bent, shear = ends[0] * slope[:, i], -ends[1] * slope[:, i]
         couple = across(sign * bent, e, np.zeros(2))
+        reaction = np.zeros((t.size, 2))
+        if rod.loads is not None and torques is not None:
+            reaction[:, np.minimum(rod.loads.held, 1)] = torques
         rest = sign * shear - self._end_loads.force(t, r[:, i])
         turn = reaction + self._end_loads.torque(t, rate[:, i]) - sign * torsion[:, i] - _dot(couple, e1)
         found["end_force"] = _split(across(rest, e, turn)).swapaxes(1, 2)
@@ -152,8 +164,8 @@ class Ground:
         torsion1 = stiffness * self._twist1 + self._stiffer * self._twist + own @ self._field[1]
         return strain, stiffness * self._twist + own @ value, torsion1
 
-    def _spins(self, t: Float, z: Phase, omega: Float) -> tuple[Float, Float]:
-        """omega. at the nodes, (k, n), and the torques of motors at the two ends, (k, 2)."""
+    def _spins(self, t: Float, z: Phase, omega: Float) -> tuple[Float, Float | None]:
+        """omega. at the nodes, (k, n), and the torques of motors, (k, motors); None without."""
         rod, q, parts = self._rod, z.hi + z.lo, self._rod.parameters
         c = rod.basis(q)
         moves, force = rod.forward(c, z.pi), -rod.mean_force(q)
@@ -164,12 +176,11 @@ class Ground:
         dh = _vector(rod.law.rate(_pair(slope), xy.swapaxes(0, 1)))
         push = rod.back(c, force)
         spin = c.t * push - c.t**2 * parts.mass * parts.radius**2 * omega * _dot(h, dh)
-        reaction = np.zeros((t.size, 2))
-        if rod.loads and rod.loads.held.size:
-            held, changes = rod.loads.held, rod.loads.motors.changes(t)
-            spin[:, held] = changes
-            reaction[:, np.minimum(held, 1)] = (changes / c.t[:, held] - push[:, held]) / c.t[:, held]
-        return spin, reaction
+        if not (rod.loads and rod.loads.held.size):
+            return spin, None
+        held, changes = rod.loads.held, rod.loads.motors.changes(t)
+        spin[:, held] = changes
+        return spin, (changes / c.t[:, held] - push[:, held]) / c.t[:, held]
 
 
 def weights(s: Float, closed: bool) -> Float:

@@ -84,14 +84,15 @@ class Runner:
     def run(self, n: int, tolerance: float) -> Motion:
         rod = SpectralRod(self._scene, n, self._density)
         watch = EndIdentities(rod) if "contact_force" in self._want and hold(self._scene) else None
-        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._kernels(rod), watch)
+        settled = bool(self._want and rod.loads and rod.loads.viscous)
+        steps = Steps(rod, self._scene.duration, tolerance, self.stages, self._first, self._kernels(rod), watch, settled)
         at, initial = rod.reader(self.s), self._scene.fields(self.s)
         begun = at(rod.start)
         states = list(steps.at(self.times))
         every = Phase(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
         fields = at(every)
         if self._want:
-            fields |= self._wanted(rod, states, watch, steps.integrals)
+            fields |= self._wanted(rod, states, watch, steps)
         if steps.lengths:
             self._first = steps.lengths[0]
         start = distances(begun, initial)
@@ -120,13 +121,12 @@ class Runner:
             _PREPARED.add(key)
         return True
 
-    def _wanted(
-        self, rod: SpectralRod, states: list[Phase], watch: EndIdentities | None, integrals: list[Float]
-    ) -> dict[str, Float]:
-        ground = Ground(rod, self.s, self._want)
-        ends = np.cumsum([len(z.pi) for z in states])[:-1]
-        known = [None] * len(states) if watch is None else [watch.at(*group) for group in zip(states, integrals, strict=True)]
-        parts = [ground.at(*group) for group in zip(np.split(self.times, ends), states, known, strict=True)]
+    def _wanted(self, rod: SpectralRod, states: list[Phase], watch: EndIdentities | None, steps: Steps) -> dict[str, Float]:
+        ground, none = Ground(rod, self.s, self._want), [None] * len(states)
+        times = np.split(self.times, np.cumsum([len(z.pi) for z in states])[:-1])
+        known = none if watch is None else [watch.at(*group) for group in zip(states, steps.integrals, strict=True)]
+        groups = zip(times, states, known, steps.rolling or none, steps.reaction or none, strict=True)
+        parts = [ground.at(*group) for group in groups]
         return with_inside({name: np.concatenate([part[name] for part in parts]) for name in parts[0]}, self.s, rod.closed)
 
 

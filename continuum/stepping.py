@@ -10,6 +10,11 @@ from end to end, but not within. If a step does not converge, or takes many swee
 **Loads.** Steps end where a signal jumps or has a corner, and are not longer than the pieces on which it is smooth
 (`continuum.timing`), so none jumps over a pulse.
 
+**Stiff dampers.** Gauss steps do not damp what is stiff: a rest of short waves, however small, stays in pi. Viscosity of bending
+turns it into a large omega., and into a force that grows like n^4. Stages have no such rest, as they solve the stiff equations
+themselves. So omega and omega. are taken from the polynomial through omega at the stages of a short step around the time asked for
+(`collocation.rolling`); that of a whole step would be less accurate by its length to the power s - 1.
+
 **End of a motion.** Long steps must not jump over the end of a motion: for the unit law a heading is lost where z = r' vanishes, at
 a point or, when a ring collapses, everywhere. z is checked at each node, and where it is nearest to zero on the straight line
 from a node to the next. If Re(conj(z_n) z_{n+1}) < |z_n|^2/2 at one of these, the step is repeated with half its length. So the
@@ -41,6 +46,7 @@ SHORTEST = 1e-9  # shortest step, relative to the duration or to the time in whi
 LONGEST = 1e3  # longest first step, relative to that time
 MOST_STEPS = 2**14
 FORETOLD = 256  # the number of steps still needed is predicted after every so many steps, from the last half of them
+SHORT = 1 / 8  # of a step: the short step that settles omega
 LONGER = 1.5  # ratio of predicted to remaining steps above which the run ends
 TOGETHER = 256  # states evaluated at once
 
@@ -79,6 +85,7 @@ class Steps:
     first : length of the first step that is tried.
     compiled : whether to use `continuum.kernels` or the plain twin; asked before each step.
     watch : has rates at the stages of steps, which are integrated.
+    settled : whether to find `rolling`, which takes a further step for each state.
 
     Attributes
     ----------
@@ -86,6 +93,8 @@ class Steps:
     integrals : those of `watch` since the start at the states that `at` gave, in groups (k, count); without it none.
     balance, reaction : work and dissipation since the start at the states that `at` gave, and torques of motors, in groups (k, 2)
         and (k, motors); without loads none.
+    rolling : omega and omega. at these states without the rest of stiff waves, in groups (2, k, n), if `settled`; None at the
+        start.
     """
 
     def __init__(
@@ -97,6 +106,7 @@ class Steps:
         first: float,
         compiled: bool | Kernels = True,
         watch: EndIdentities | None = None,
+        settled: bool = False,
     ) -> None:
         self.rod, self._duration, self._tolerance, self._compiled = rod, duration, tolerance, compiled
         self._stages = stages
@@ -110,7 +120,8 @@ class Steps:
         self.balance: list[Float] = []
         self.reaction: list[Float] = []
         self.integrals: list[Float] = []
-        self._watch = watch
+        self.rolling: list[Float | None] = []
+        self._watch, self._settles = watch, settled
         self._timing = rod.loads.timing if rod.loads else None
 
     def at(self, times: Float) -> Iterator[Phase]:
@@ -118,6 +129,7 @@ class Steps:
         t, z, spent, loads = 0.0, self.rod.start, np.zeros(2), self.rod.loads
         torque = driven_ends.reaction(self.rod, t, z)[None] if loads else np.empty((1, 0))
         watch, total, rates = self._watch, np.zeros(self._watch.count if self._watch else 0), np.empty(0)
+        last: tuple[float, float, Phase, Float, Float] | None = None
         while times.size:
             if times[0] <= t:
                 if loads:
@@ -125,11 +137,14 @@ class Steps:
                     self.reaction.append(torque)
                 if watch:
                     self.integrals.append(total[None])
+                if self._settles:
+                    self.rolling.append(None if last is None else self._settled(*last, np.ones(1)))
                 yield Phase(z.hi[None], z.lo[None], z.pi[None])
                 times = times[1:]
                 continue
             before, start = t, z
             t, z, v, p = self._advance(t, z)
+            last = before, t - before, start, v, p
             inside = times[times < t]
             power = None
             if watch:
@@ -145,6 +160,8 @@ class Steps:
                         self.reaction.append(collocation.between(torques, parts))
                     if watch:
                         self.integrals.append(total + collocation.spent(t - before, rates, parts))
+                    if self._settles:
+                        self.rolling.append(self._settled(*last, parts))
                     yield collocation.within(start, t - before, v, p, parts)
             if watch:
                 total = total + collocation.spent(t - before, rates, np.ones(1))[0]
@@ -152,6 +169,18 @@ class Steps:
                 z, kick = driven_ends.hold(self.rod, t, z)
                 spent = spent + collocation.spent(t - before, power, np.ones(1))[0] + (kick, 0.0)
             times = times[inside.size :]
+
+    def _settled(self, t: float, h: float, z: Phase, v: Float, p: Float, parts: Float) -> Float:
+        """omega and omega. at fractions `parts` (F,) of a step from z at t, (2, F, n), from a short step around each."""
+        assert self._modes is not None
+        found = []
+        for part in parts:
+            begin = max(part - SHORT, 0.0)
+            first = Phase(*(values[0] for values in collocation.within(z, h, v, p, np.array([begin]))))
+            _, rates, _, taken = self._sweep(t + begin * h, first, SHORT * h)
+            short = (SHORT * h, rates, (part - begin) / SHORT) if taken else (h, v, part)
+            found.append(collocation.rolling(*short))
+        return np.stack(found, axis=1)
 
     def _step(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:
         """As `collocation.step`. The modes of an earlier step are used as long as this saves time."""

@@ -30,7 +30,20 @@ def test_with_consistent_ends_everything_converges_at_second_order(law):
     assert study.error[-1].max() < 2e-3
     floors = dict(zip(study.names, study.floors, strict=True))
     assert 1e-5 < floors.pop("force inside") < 1e-3  # fourth derivatives: the error of the field's waves
+    assert floors.pop("end force") < 5e-5  # needs the force near the end
     assert max(floors.values()) < 1e-5
+
+
+@pytest.mark.slow
+def test_what_the_field_adds_to_the_end_force_is_not_taken_for_the_discs():
+    """A field whose force is 5e-4 off at the ends, by its own estimate, and 2e-3 in what discs are compared with."""
+    coarse, fine = (convergence(untwisting_rod(), (65, 257), "consistent", tol=t, want="contact_force") for t in (1e-5, 1e-7))
+    at = coarse.fields.index("end force")
+    added = np.abs(coarse.error - fine.error)[-1, at]
+    floors = dict(zip(coarse.names, coarse.floors, strict=True))
+    assert added / 3 < floors["end force"] < 3 * added
+    assert coarse.wants_rows()[3][3:] == ("-", "2e-03")  # errors of 8e-2 and 4e-3: the latter is the field's
+    assert fine.order[-1, at] == pytest.approx(2.0, abs=0.1)
 
 
 @pytest.mark.slow
