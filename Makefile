@@ -11,7 +11,7 @@ export NO_MKDOCS_2_WARNING := 1
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
     $(addprefix continuum/test_, cells.py lattice.py lagrangian.py))
 
-.PHONY: run test long quick lint types kernels tested field docs minimal coverage clean
+.PHONY: run test bench long quick lint types kernels tested field docs minimal coverage clean
 
 run: .venv/run
 	$(BIN)/python -m compare --out out
@@ -29,6 +29,14 @@ long: .venv/dev kernels field
 quick: .venv/dev
 	$(MAKE) --no-print-directory --jobs 2 lint types
 	$(BIN)/pytest -m "not slow and not long"
+
+# processor times of kernels, calls, "auto" and the field; `make bench AGAINST=v0.1.0`, or a wheel: ratios to it, in turns
+bench: .venv/dev kernels field
+ifdef AGAINST
+	$(BIN)/python -m tests.benchmarks.against $(AGAINST)
+else
+	$(BIN)/pytest -p no:xdist -o addopts= tests/benchmarks/bench_speed.py
+endif
 
 lint: .venv/dev
 	$(BIN)/ruff check --quiet .
