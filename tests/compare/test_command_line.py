@@ -108,6 +108,7 @@ def test_overview_without_a_second_process(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == FILES
 
 
+@pytest.mark.long
 def test_scene_without_motion(tmp_path, capsys):
     (tmp_path / "still.toml").write_text('scene = "untwisting_rod"\ntwist = 0.0\nduration = 0.5\n')
     assert main(["--scene", str(tmp_path / "still.toml"), "--out", str(tmp_path / "out"), "--n", "9", "17", "--quiet"]) == 0

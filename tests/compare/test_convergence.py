@@ -82,6 +82,7 @@ def test_elements_converge_at_order_four(tmp_path):
     assert (tmp_path / "orders.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_elements_of_varying_loaded_rods_and_of_rings_have_order_four():
     """By what twice as many discs change. (A density with a slope at an end would make the initial twist rough there.)"""
     q = np.pi / 4

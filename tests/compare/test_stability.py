@@ -145,6 +145,7 @@ def test_rounding(table):
         assert one(table, "rounding", "N = 1025", method).found.error < 1e-9
 
 
+@pytest.mark.long
 def test_peers():
     """A peer computes the same motion; its energy is that at the end; a slow one reports the time it reached."""
     (case,) = (c for c in SMALL if c.setting == "N = 3")

@@ -122,6 +122,7 @@ def test_the_death_of_a_case_is_its_own(tmp_path, noted):
     assert [r.value for r in again] == [7, None, 8, 9, 10]
 
 
+@pytest.mark.long
 def test_a_case_that_breaks_an_executor_takes_no_other_with_it(noted):
     cases = [7, 3, 8, 9]
     with ProcessPoolExecutor(1, get_context("spawn")) as executor:
@@ -139,12 +140,14 @@ def leaves(n):
     return n
 
 
+@pytest.mark.long
 def test_what_a_case_leaves_behind_is_not_the_fault_of_the_next():
     with background(1) as workers:
         found = sweep(leaves, [1, 2, 3], workers, progress=False)
     assert [r.value for r in found] == [1, 2, 3]
 
 
+@pytest.mark.long
 def test_ours_hear_of_what_is_raised_in_another_process():
     with background() as workers:
         with pytest.raises(ValueError, match="three is refused") as raised:

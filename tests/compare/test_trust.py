@@ -157,6 +157,7 @@ def test_command_line(tmp_path, capsys):
     assert "scenes must be a whole number of at least 1; got 0" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_an_interrupted_run_keeps_what_it_has_found(tmp_path, capsys, monkeypatch):
     out = tmp_path / "out"
     trust(1, first=7, archive=out / "trust.jsonl", progress=False)

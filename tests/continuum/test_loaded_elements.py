@@ -195,6 +195,7 @@ def test_loads_that_cannot_be_taken_are_refused(loads, message):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_sudden_rest_shape_says_why_it_is_slow():
     """It violates the end condition at t = 0, and a front of phi' runs along the rod."""
     with pytest.raises(ValueError, match=r"errors fall slowly: .* start them smoothly, as by signals.smooth"):

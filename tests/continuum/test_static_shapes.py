@@ -94,6 +94,7 @@ def test_a_slightly_bent_rod_relaxes_to_a_circle():
     assert run.energy[-1] < 1e-3 * run.energy[0]
 
 
+@pytest.mark.long
 def test_a_rod_with_the_true_curvature_turns_by_its_rest_value_everywhere():
     """However large: V = int K (phi' - kappa_0)^2/2, and e psi turns the line by R psi'/|r'|, so (m'/|r'|)' = 0 and m = 0.
 

@@ -50,6 +50,7 @@ def test_a_bent_rod_that_turns_dissipates_nothing(model):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:suzuki4. its substeps back in time amplify")  # short waves, which are not excited
+@pytest.mark.long
 def test_viscosity_damps_bending_waves_like_an_oscillator():
     """A straight periodic rod, y = R theta: M theta.. = -(beta t + K R^2 t^2) theta - eta R^2 t^2 theta., t = 4 sin^2(q k/2)/k^2.
 

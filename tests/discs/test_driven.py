@@ -211,6 +211,7 @@ def test_a_bead_in_the_plane_on_a_wire_that_swings():
     assert balance(path) < 1e-9
 
 
+@pytest.mark.long
 def test_a_position_that_is_driven_does_not_drift():
     """x. = cos t: x = sin t to rounding, also at a loose tolerance; the rod of a pendulum besides is kept too."""
     system = MechanicalSystem.from_lagrangian(
@@ -251,6 +252,7 @@ def test_a_stiff_damper_is_found_stiff():
     assert balance(path) < 1e-6
 
 
+@pytest.mark.long
 def test_a_push_that_starts_late_from_rest():
     """int (t - 5)^2 (6 - t)^2 dt = 1/30; at rest before, no tolerance is relative to anything."""
     system = one(lambda t, q, v: ((t - 5) * (6 - t)) ** 2 if 5 < t < 6 else 0.0)
@@ -259,6 +261,7 @@ def test_a_push_that_starts_late_from_rest():
     assert path.work[-1] == pytest.approx(0.5 / 30**2, rel=1e-8)
 
 
+@pytest.mark.long
 def test_a_short_push_is_found_with_a_shorter_step():
     def push(t, q, v):
         return np.exp(-(((t - 5.3) / 0.01) ** 2))

@@ -72,6 +72,7 @@ WITHOUT_LOCKS = (
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_without_locks_the_first_run_stops_and_reports_nothing_of_the_second(tmp_path):
     """On a file system without locks, another run may take the path."""
     path = tmp_path / "run.nc"

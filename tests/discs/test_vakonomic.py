@@ -169,6 +169,7 @@ def test_free_disc_without_momentum_rolls_the_same_way():
     assert np.abs(solve(free, Q, V, times, np.zeros(2)).q - circle.q)[-1].min() > 0.1
 
 
+@pytest.mark.long
 def test_on_an_incline_the_nonholonomic_disc_does_not_descend():
     """A cycloid: phi. is constant, (I + m R^2) omega. = R F.J d_1, and a whole turn moves the disc across F alone."""
     incline = rolling_disc(mass=M, spin_inertia=SPIN, heading_inertia=TURN, radius=R, pull=tuple(PULL))
@@ -248,6 +249,7 @@ def test_vakonomic_chain_makes_the_augmented_action_stationary(model):
     np.testing.assert_allclose(rate[:2], rolled, atol=1e-9)
 
 
+@pytest.mark.long
 def test_picture(tmp_path):
     figure = figures.vakonomic()
     assert len(figure.axes) == 3
