@@ -1,4 +1,4 @@
-"""Make the pictures of docs/pictures.md, ground-force, loads, motion, vakonomic.png and rod.gif: `docs/pictures.py`, 40 s.
+"""Make the pictures of docs/pictures.md, ground-force, loads, modes, motion, vakonomic.png and rod.gif: `docs/pictures.py`, 40 s.
 
 The page's picture needs chromium. convergence.png, energy.png and limits.png are the main job's; `python -m continuum.figures
 docs/images` makes those of the field.
@@ -17,8 +17,10 @@ from PIL import Image
 
 from compare import convergence, figures, lump
 from compare.limit_figures import limits_of
-from continuum import solve, untwisting_rod
-from discs import Solution, simulate
+from continuum import dispersion, solve, untwisting_rod
+from discs import Chain, Problem, Solution, State, simulate
+from discs.analysis import modes
+from discs.chains.twist import PAPER
 from discs.loads import Damping, Torque, signals
 from discs.pictures import figures as of_discs
 from discs.pictures.animation import Stage
@@ -103,6 +105,34 @@ def along(run: Solution) -> np.ndarray:
     return ((run.contact_force[:, 0] - 1j * run.contact_force[:, 1]) * slope / abs(slope)).real
 
 
+def small_motions() -> Figure:
+    """Modes of rings: frequencies at rest, growth while they roll, with the dispersion relations."""
+    figure = Figure(figsize=(10.5, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    rod, n = untwisting_rod().rod, 64
+    q = 2 * np.pi / rod.length * np.linspace(0.0, n / 4, 400)
+    for law, colour, mark in (("field", BLUE, "o"), ("unit", ORANGE, "x")):
+        chain = Chain(n=n, ends="ring", shift=(rod.length, 0.0), rolling=law, **PAPER)
+        still = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 1.0)
+        found = modes(still, count=n)
+        turns = np.abs(np.fft.fft(found.shape[:, 2], axis=1)).argmax(axis=1)
+        waves = 2 * np.pi / rod.length * np.minimum(turns, n - turns)
+        left.plot(waves, np.abs(found.rate), mark, color=colour, fillstyle="none", label=f"{n} discs, {law} law")
+        rolling = modes(replace(still, initial=replace(still.initial, omega=1.0)), count=2 * n - 2)
+        turns = np.abs(np.fft.fft(rolling.shape[:, 2], axis=1)).argmax(axis=1)
+        waves = 2 * np.pi / rod.length * np.minimum(turns, n - turns)
+        right.plot(waves, rolling.rate.real, mark, color=colour, fillstyle="none", label=f"{n} discs, {law} law")
+        right.plot(q, dispersion.growth(rod, q, 1.0, law), color=INK, linewidth=0.8)
+        right.plot(q, dispersion.growth(rod, q, 1.0, law, chain.k), "--", color=colour, linewidth=0.8)
+    left.plot(q, dispersion.frequency(rod, q), color=INK, linewidth=0.8, label="the field")
+    left.set(xlabel="wave number q", ylabel="frequency", title="At rest", xlim=(0, 30), ylim=(0, 1.05 * np.abs(found.rate).max()))
+    right.set(xlabel="wave number q", ylabel="Re σ", title="Rolling sideways, ω = 1", xlim=(0, q[-1]), ylim=(-0.1, 1.3))
+    for ax in (left, right):
+        ax.legend(fontsize=8)
+        ax.grid(alpha=0.3)
+    return figure
+
+
 def main() -> None:
     scene = untwisting_rod()
     run = simulate(lump(scene, n=32, ends="consistent"), dt=0.02, frames=91)
@@ -112,6 +142,7 @@ def main() -> None:
     figures.motion(solve(scene, tol=1e-3, frames=5), scene).savefig(IMAGES / "motion.png", dpi=110)
     of_discs.vakonomic().savefig(IMAGES / "vakonomic.png", dpi=110)
     loads().savefig(IMAGES / "loads.png", dpi=100)
+    small_motions().savefig(IMAGES / "modes.png", dpi=100)
     ground_force().savefig(IMAGES / "ground-force.png", dpi=100)
     if not shutil.which("chromedriver"):
         sys.exit("no chromedriver: view.png is not made")

@@ -37,12 +37,17 @@ class Linearised:
 
     Attributes
     ----------
-    system : the equations of motion. z : the state. t : the time of loads.
+    problem : the chain and its loads. z : the state. t : the time of loads.
     """
 
-    system: RollingDiscs
+    problem: Problem
     z: Phase
     t: float = 0.0
+
+    @property
+    def system(self) -> RollingDiscs:
+        """The equations of motion."""
+        return self.problem.system
 
     @cached_property
     def free(self) -> Bool:
@@ -189,4 +194,4 @@ def linearise(problem: Problem, at: State | None = None, t: float = 0.0) -> Line
         if not isinstance(at, State):
             raise ValueError(f"at must be a State, as `equilibrium(problem)` finds; got {checks.shown(at)}")
         problem = Problem(problem.chain, at, problem.duration, problem.loads)
-    return Linearised(problem.system, problem.start(), checks.number("t", t))
+    return Linearised(problem, problem.start(), checks.number("t", t))
