@@ -16,8 +16,10 @@ The limit of the end force needs the field's force per length near the end, whos
 contact_moments are computed without that force, and cos(0) + cos(pi s/length) sees one end, cos(0) - cos(pi s/length) the other. By
 half as much the parts and the moments differ (`_defect`), and this is added to the field's estimated error of the end force.
 
-The energy per length of discs of order four is that of their elements, the mean over each, whose sum is the energy of the chain; it
-is compared with the field's mean over the same element.
+Velocity, energy and force per length of discs of order four are those of their elements: the means over each, compared with the
+field's mean over the same element. The sum of the energies is that of the chain; lambda_i/w_i alone has order two, see
+`discs.mechanics.ground`. Elements have a second branch of waves, in which middles swing against the discs where elements meet. It
+starts with displacements of k^4 and frequencies of 1/k: velocities at the discs have order three, the means do not see it.
 
 The energy density of other discs is rho |r.|^2/2 + alpha omega^2/2 + beta theta'^2/2 + K |r''|^2/2, with headings of their own
 that of the strains. Strains are taken at the discs: means of the two links beside one, at an end of the link there and a ghost
@@ -107,7 +109,10 @@ class Limit:
         for name in self._want:
             limit = self._splines[name](run.s).T
             if name in PAIRS:
-                found[name] = float(np.abs(np.stack([getattr(run, array)[-1] for array in PAIRS[name]]) - limit).max())
+                values = np.stack([getattr(run, array)[-1] for array in PAIRS[name]])
+                if name == "velocity" and run.problem is not None and _elements(run.problem.chain):
+                    values, limit = simpson(values, self._scene.closed), self._means(name, run.problem.chain)
+                found[name] = float(np.abs(values - limit).max())
             elif name == "energy_density":
                 found["energy inside"] = self._of_the_energy(run, limit)
             else:
@@ -118,17 +123,26 @@ class Limit:
         assert run.problem is not None
         chain, away = run.problem.chain, inner(run)
         density = energy_density(self._scene, run)
-        if isinstance(chain, SteeredChain) and chain.degree == 2:
-            first, away = chain.s[::2][: density.shape[1]], away[1::2]
-            integral = self._splines["energy_density"].antiderivative()
-            limit = ((integral(first + 2 * chain.k) - integral(first)) / (2 * chain.k)).T
+        if _elements(chain):
+            limit, away = self._means("energy_density", chain), away[1::2]
         return _largest(density[:, away], limit[:, away])
+
+    def _means(self, name: str, chain: Chain | SteeredChain) -> Float:
+        """The means of a quantity over the elements of discs of order four, (components, elements)."""
+        first = chain.s[: 2 * (chain.n // 2) : 2]
+        integral = self._splines[name].antiderivative()
+        found: Float = ((integral(first + 2 * chain.k) - integral(first)) / (2 * chain.k)).T
+        return found
 
     def _of_the_ground(self, run: Solution, limit: Float) -> dict[str, float]:
         assert run.problem is not None
         assert run.contact_force is not None
         chain, force, away = run.problem.chain, run.contact_force[-1], inner(run)
-        found = {"force inside": float(np.abs(force / chain.w - limit)[:, away].max()) / _size(limit[:, away])}
+        per_length, known = force / chain.w, limit
+        if _elements(chain):
+            known, away = self._means("contact_force", chain), away[1::2]
+            per_length = simpson(per_length, chain.ends == "ring")
+        found = {"force inside": _largest(per_length[:, away], known[:, away])}
         tests = smooth_tests(chain.s, chain.length, self._scene.closed)[0]
         found["force weak"] = _largest(force @ tests.T, self._values["force weak"])
         if "end force" in self._values:
@@ -148,6 +162,18 @@ def _defect(field: Solution) -> float:
     parts = field.contact_force[-1] @ (eta * weights(field.s, False)).T + field.end_force[-1].T @ eta[:, [0, -1]].T
     whole, between = (parts - field.contact_moments[-1][:, :2]).T
     return float(np.abs([whole + between, whole - between]).max()) / 2
+
+
+def _elements(chain: Chain | SteeredChain) -> bool:
+    return isinstance(chain, SteeredChain) and chain.degree == 2
+
+
+def simpson(values: Float, ring: bool) -> Float:
+    """The means over the elements of discs of order four, (..., elements), of values at the discs, (..., n)."""
+    first = values[..., ::2]
+    after = np.roll(first, -1, axis=-1) if ring else first[..., 1:]
+    found: Float = (first[..., : after.shape[-1]] + 4 * values[..., 1::2] + after) / 6
+    return found
 
 
 def energy_density(scene: Scene, run: Solution) -> Float:
@@ -197,10 +223,7 @@ def _of_elements(scene: Scene, chain: SteeredChain, run: Solution, d: Float) -> 
     strain, twist, bend = np.exp(-1j * heading) * (slopes[0] + 1j * slopes[1]) / k - 1, slopes[2] / k, slopes[3] / k
     elastic = there.stretch_stiffness * strain.real**2 + there.shear_stiffness * strain.imag**2
     elastic = elastic + there.torsion_stiffness * twist**2 + there.bending_stiffness * bend**2
-    ends = kinetic[::2]
-    after = np.roll(ends, -1) if chain.ends == "ring" else ends[1:]
-    simpson = (ends[: after.size] + 4 * kinetic[1::2] + after) / 6
-    found: Float = 0.5 * (simpson + 0.5 * (elastic[::2] + elastic[1::2]))[None]
+    found: Float = 0.5 * (simpson(kinetic, chain.ends == "ring") + 0.5 * (elastic[::2] + elastic[1::2]))[None]
     return found
 
 

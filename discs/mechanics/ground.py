@@ -11,6 +11,11 @@ their own the end disc alone carries the force, and there is no couple.
 **Continuation.** Beyond the discs that the end disturbs (six with slaved headings, and more than one in a hundred; one with own
 headings) a polynomial of degree 5 in s is fitted to lambda_i/w_i of the next nine discs, or one in 32.
 
+**Elements.** On discs of order four (quadratic elements, Simpson's shares) lambda_i is the integral of lambda times the element
+function of disc i. So lambda_i/w_i is off by -k^2 lambda''/5 where elements meet and by k^2 lambda''/10 in their middles, and a sum
+that ends within an element by k^3. The sum over whole elements, the last disc by half, is off by k^4, and so is the mean force per
+length of an element, (lambda_1/2 + lambda_2 + lambda_3/2)/2k. Sums with `inside` are over whole elements.
+
 **Error.** (a) That of the continuation is the change to another one: half as many discs more are left out, and the degree is 4.
 (b) That of the discs: their end is uncertain by about half a spacing. At plain ends, of first order, it moves the force by
 (k/2) lambda and the couple by (k/2) force; at other ends, of second order, by (k/2)^2 lambda' and (k/2)^2 lambda. The estimate is
@@ -71,9 +76,11 @@ def end_forces(run: Solution, inside: Float | None = None) -> EndForces:
         )
     if inside is None and chain.n < LEAST:
         raise ValueError(f"end forces of a chain alone need at least {LEAST} discs; got {chain.n}: take more, or give `inside`")
-    own = isinstance(chain, SteeredChain)
+    own, elements = isinstance(chain, SteeredChain), isinstance(chain, SteeredChain) and chain.degree == 2
     few = 1 if own else max(DISTURBED, chain.n // 100)
     s, k = chain.s, chain.k
+    near = int((s < SHARE * chain.length).sum())
+    near -= elements and near % 2 == 0
     values, errors = np.empty((2, lam.shape[0], 2, 2)), np.empty((2, lam.shape[0], 2))
     for end, order in enumerate((1, -1)):
         found, w = lam[..., ::order], chain.w[::order]
@@ -83,9 +90,9 @@ def end_forces(run: Solution, inside: Float | None = None) -> EndForces:
             change = _sums(found, w, s, limit) - _sums(found, w, s, other)
         else:
             known = inside[..., ::order]
-            limit, slope = known[..., s < SHARE * chain.length], (known[..., 1] - known[..., 0]) / k
+            limit, slope = known[..., :near], (known[..., 1] - known[..., 0]) / k
             change = np.zeros_like(values[:, :, end])
-        values[:, :, end] = _sums(found, w, s, limit)
+        values[:, :, end] = _sums(found, w, s, limit, halved=elements and inside is not None)
         if own or chain.ends == "consistent":
             moved = (k / 2) ** 2 * np.stack([slope, limit[..., 0]])
         else:
@@ -107,10 +114,12 @@ def _continued(s: Float, values: Float, n: int, degree: int) -> tuple[Float, Flo
     return found.reshape(*values.shape[:2], n), slope.reshape(values.shape[:2])
 
 
-def _sums(lam: Float, w: Float, s: Float, limit: Float) -> Float:
-    """Sums of the first discs' forces less w limit (F, 2, n), and their first moments, (2, F, 2)."""
+def _sums(lam: Float, w: Float, s: Float, limit: Float, halved: bool = False) -> Float:
+    """Sums of the first discs' forces less w limit (F, 2, n), and their first moments, (2, F, 2); half of the last if `halved`."""
     n = limit.shape[-1]
     rest = lam[..., :n] - w[:n] * limit
+    if halved:
+        rest[..., -1] /= 2
     return np.stack([rest.sum(axis=-1), (rest * s[:n]).sum(axis=-1)])
 
 

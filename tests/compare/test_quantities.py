@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from compare import convergence, lump
+from compare.load_limits import fitting_twist
 from compare.quantities import WANTS, Limit, energy_density
 from continuum import breathing_ring, rolling_rod, solve, steered_rod, untwisting_rod
 from discs import simulate
@@ -60,6 +61,15 @@ def test_own_headings_and_rings_converge_at_second_order(scene):
     ends = () if scene.closed else ("end force",)
     assert study.names == ("velocity", "slope", "energy inside", "force inside", "force weak", *ends)
     assert study.order[-1] == pytest.approx(2.0, abs=0.15), study.table()
+
+
+@pytest.mark.slow
+def test_elements_converge_at_fourth_order_in_every_quantity():
+    """By their means over elements, and sums over whole elements at the ends; measured 3.9 to 4.1."""
+    scene = replace(steered_rod(), initial=partial(fitting_twist, fields=6))
+    study = convergence(scene, (65, 129), tol=1e-8, dt=0.03, degree=2, want=WANTS, progress=False)
+    assert study.names == ("velocity", "slope", "energy inside", "force inside", "force weak", "end force")
+    assert study.order[-1] == pytest.approx(4.0, abs=0.2), study.table()
 
 
 def test_energy_density_adds_up():
