@@ -123,7 +123,7 @@ SHORT = "force at an end", "viscosity of bending"
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in SHORT else pytest.mark.long) for name in OWN])
 def test_loads_on_a_rod_with_own_headings(name):
-    """<lambda, s^k> = int rho r.. s^k + n k s^(k-1) - F s^k up to k = 3, from frames and strains; measured 5e-7 to 6e-6 of length^k."""
+    """<lambda, s^k> = int rho r.. s^k + n k s^(k-1) - F s^k up to k = 3, from frames and strains: 5e-7 to 6e-6 of length^k."""
     middle, step, length, stiffness = 0.8, 1e-3, 3.7, (8.0, 5.0)
     scene = replace(steered_rod(*stiffness, 0.3, duration=0.81, **ROD), initial=steered, loads=(OWN[name],) if OWN[name] else ())
     found = field(scene, frames=middle + step * np.arange(-2, 3))
