@@ -2,18 +2,22 @@
 
 import time as clock
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from compare import convergence, lump
 from compare.load_limits import fitting_twist
-from compare.quantities import WANTS
+from compare.quantities import WANTS, simpson
 from continuum import breathing_ring, exact, solve, steered_rod, untwisting_rod
 from continuum.mesh import semidiscretise
-from discs import Midpoint, Solution, Suzuki4, simulate
+from continuum.solver import spline
+from discs import Gauss8, Midpoint, Solution, Suzuki4, simulate
+from discs.mechanics.ground import inner
 
 FINE = Suzuki4(Midpoint(tolerance=1e-11))
+EXACT = Gauss8(tolerance=1e-13)
 FIELDS = ("x", "y", "theta")
 
 
@@ -41,9 +45,34 @@ def orders() -> None:
                 print(f"{quantity:14s}", *(f"{o:.2f}" for o in order), f"± {spread:.2f}")
 
 
+def against(field: Solution, run: Solution, names: tuple[str, str]) -> np.ndarray:
+    """Errors of two components at the last frame of discs, (2, n)."""
+    return np.stack([getattr(run, a)[-1] - spline(untwisting_rod(), field.s, getattr(field, a)[-1:])(run.s)[:, 0] for a in names])
+
+
+def places() -> None:
+    """Where r' of the unit law is off most, and velocities disc by disc of elements of three."""
+    scene = untwisting_rod("unit")
+    field = solve(scene, 1e-9, frames=1, progress=False, want="slope")
+    for n in (129, 257, 513, 1025):
+        run = simulate(lump(scene, n, "consistent"), EXACT, 0.015, frames=1, want=("slope",), progress=False)
+        off = np.abs(against(field, run, ("slope_x", "slope_y"))).max(axis=0)
+        most = int(off.argmax())
+        print(f"unit law, N = {n}, r': {off[most]:.1e} at disc {min(most, n - 1 - most)} from an end, "
+              f"{off[0]:.1e} at the end, {off[inner(run)].max():.1e} inside")  # fmt: skip
+    scene = replace(steered_rod(), initial=partial(fitting_twist, fields=6))
+    field = solve(scene, 1e-9, frames=1, progress=False, want="velocity")
+    for n in (33, 65, 129, 257):
+        run = simulate(lump(scene, n, degree=2), EXACT, 0.015, frames=1, want=("velocity",), progress=False)
+        off = against(field, run, ("x_rate", "y_rate"))
+        print(f"elements, fitting twist, N = {n}, velocity of discs: {np.abs(off).max():.2e}, "
+              f"without the second branch of waves {np.abs(simpson(off, False)).max():.2e}")  # fmt: skip
+
+
 def main() -> None:
     """All of them."""
     orders()
+    places()
     sizes = (257, 513, 1025, 2049, 4097)
     u = chains("consistent", sizes)
     change = [np.abs(b - a).max(axis=1) for a, b in pairwise(u)]
