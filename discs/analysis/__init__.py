@@ -1,7 +1,8 @@
-"""Small motions about a state: the linearised equations and what follows from them; see docs/small-motions.md."""
+"""Small motions about a state, and states at rest; see docs/small-motions.md."""
 
 from discs.analysis.linear import Linearised, linearise
 from discs.analysis.modes import Modes, modes
+from discs.analysis.rest import equilibrium
 from discs.analysis.steady import Steady, steady
 
-__all__ = ["Linearised", "Modes", "Steady", "linearise", "modes", "steady"]
+__all__ = ["Linearised", "Modes", "Steady", "equilibrium", "linearise", "modes", "steady"]

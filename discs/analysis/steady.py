@@ -86,7 +86,7 @@ class Steady:
 def steady(problem: Problem, at: State | None = None) -> Steady:
     """The linearised equations about a steady motion; ValueError, with the reason, for a state whose motion is not steady."""
     lin = linearise(problem, at)
-    _autonomous(lin, problem.duration)
+    autonomous(lin, problem.duration)
     drift, turning = _rigid(lin)
     _balanced(lin, Steady(lin, drift, turning).slow)
     found = Steady(lin, drift, turning)
@@ -95,7 +95,7 @@ def steady(problem: Problem, at: State | None = None) -> Steady:
     return found
 
 
-def _autonomous(lin: Linearised, duration: float) -> None:
+def autonomous(lin: Linearised, duration: float) -> None:
     """Refuse loads that depend on time."""
     load, q = lin.system.load, lin.z.hi
     if load is None:
@@ -137,22 +137,30 @@ def _rigid(lin: Linearised) -> tuple[Float, float]:
     return fit[:2], float(fit[2])
 
 
-def _balanced(lin: Linearised, slow: float, when: str = "in the state given") -> None:
-    """Refuse a state in which discs accelerate by more than rounding and `CLOSE` explain."""
+def accelerations(lin: Linearised, slow: float) -> tuple[Float, Float, float]:
+    """Accelerations of the angles that no motor prescribes, what a steady motion allows, and that of the largest force.
+
+    slow : the slowest rate; a displacement by `CLOSE` rad is allowed. To it comes the rounding of forces, which are differences.
+    """
     system, c, strains = lin.system, lin.basis, lin.strains
     roots = c[2:].reshape(lin.z.pi.shape)  # 1/sqrt(m): accelerations are pi'/sqrt(m)
-    acceleration = (roots * system.back(c, lin.unbalanced)).ravel()[lin.free]
-    forces = np.abs(roots * system.back(np.abs(c), np.abs(lin.unbalanced)))
+    found = -(roots * system.back(c, lin.unbalanced)).ravel()[lin.free]
+    largest = float(np.max(roots * system.back(np.abs(c), np.abs(lin.unbalanced))))
     places = np.abs(lin.z.hi - lin.z.hi.mean(axis=1, keepdims=True) * (np.arange(len(c)) > 1)[:, None])
     sizes = strains.stiffness * (abs(strains.matrix) @ places.ravel())
     rounding = 8 * EPS * roots * system.back(np.abs(c), (abs(strains.matrix).T @ sizes).reshape(c.shape))
-    allowed = CLOSE * max(float(forces.max()), slow**2) + rounding.ravel()[lin.free]
+    return found, CLOSE * max(largest, slow**2) + rounding.ravel()[lin.free], largest
+
+
+def _balanced(lin: Linearised, slow: float, when: str = "in the state given") -> None:
+    """Refuse a state in which discs accelerate."""
+    acceleration, allowed, _ = accelerations(lin, slow)
     if (excess := np.abs(acceleration) - allowed).max(initial=0.0) > 0:
-        worst = int(np.flatnonzero(lin.free)[np.argmax(excess)])
-        disc, what = worst % system.n, "roll" if worst < system.n else "turning"
+        worst = int(np.argmax(excess))
+        disc, column = int(np.flatnonzero(lin.free)[worst]) % lin.system.n, int(np.flatnonzero(lin.free)[worst]) // lin.system.n
         raise ValueError(
-            f"small motions are about an equilibrium or a steady motion; {when} the {what} of disc {disc} accelerates "
-            f"by {np.abs(acceleration).max():.3g} rad per time squared: {CURE}"
+            f"small motions are about an equilibrium or a steady motion; {when} the {('roll', 'turning')[column]} of disc {disc} "
+            f"accelerates by {np.abs(acceleration[worst]):.3g} rad per time squared: {CURE}"
         )
 
 
