@@ -5,9 +5,11 @@ import sys
 from dataclasses import replace
 
 from discs import command_line
+from discs.analysis.lyapunov import lyapunov
 from discs.analysis.modes import modes
 from discs.chains.rolling import ROLLING
 from discs.chains.twist import DURATION, PAPER, STEERED, TURNS, untwisting_chain
+from discs.problem import Problem
 
 UNITS = {
     "length": "length of the rod, length",
@@ -42,27 +44,42 @@ def parser() -> argparse.ArgumentParser:
     command_line.add_run_options(run)
     _add_rod(run)
     run.set_defaults(run=run_twist)
+    chaos = commands.add_parser(
+        "lyapunov",
+        help="rates at which errors grow along the motion",
+        description="Lyapunov exponents of the twisted rod that lets go, and when an error of 1e-16 has grown to 1e-3.",
+    )
+    chaos.add_argument("--t", metavar="T", type=float, default=DURATION, help=f"duration, time (default: {DURATION})")
+    chaos.add_argument("--twist", metavar="TURNS", type=float, default=TURNS, help=f"turns between the ends (default: {TURNS})")
+    chaos.add_argument("--dt", metavar="H", type=float, help="time step (default: suggested)")
+    _add_straight(chaos, n=17, count=1, what="exponents")
+    chaos.set_defaults(run=show_exponents)
     small = commands.add_parser(
         "modes",
         help="rates and shapes of small motions",
         description="The slowest small motions of the straight rod, at rest or rolling sideways: growth and frequency of each.",
     )
-    small.add_argument("--rolling", choices=(*ROLLING, "own"), default="field", help="law; own: own headings (default: field)")
-    small.add_argument("--n", metavar="N", type=int, default=64, help="number of discs (default: 64)")
-    small.add_argument("--count", metavar="M", type=int, default=8, help="how many modes, zero left out (default: 8)")
-    small.add_argument("--omega", metavar="RATE", type=float, default=0.0, help="rate of roll, rad per time (default: 0, at rest)")
-    small.add_argument(
+    _add_straight(small, n=64, count=8, what="modes, zero left out")
+    small.set_defaults(run=show_modes)
+    command_line.add_file_commands(commands)
+    return p
+
+
+def _add_straight(p: argparse.ArgumentParser, n: int, count: int, what: str) -> None:
+    """Options of an analysis of a rod that is straight at first."""
+    p.add_argument("--rolling", choices=(*ROLLING, "own"), default="field", help="law; own: own headings (default: field)")
+    p.add_argument("--n", metavar="N", type=int, default=n, help=f"number of discs (default: {n})")
+    p.add_argument("--count", metavar="M", type=int, default=count, help=f"how many {what} (default: {count})")
+    p.add_argument("--omega", metavar="RATE", type=float, default=0.0, help="rate of roll, rad per time (default: 0, at rest)")
+    p.add_argument(
         "--ends",
         choices=("springs", "consistent", "paper"),
         default="springs",
         help="how the free ends are treated (default: springs)",
     )
-    small.add_argument("--degree", metavar="P", type=int, default=1, help="2: elements of three discs, --rolling own (default: 1)")
-    command_line.add_loads(small)
-    _add_rod(small)
-    small.set_defaults(run=show_modes)
-    command_line.add_file_commands(commands)
-    return p
+    p.add_argument("--degree", metavar="P", type=int, default=1, help="2: elements of three discs, --rolling own (default: 1)")
+    command_line.add_loads(p)
+    _add_rod(p)
 
 
 def _add_rod(p: argparse.ArgumentParser) -> None:
@@ -77,11 +94,23 @@ def _rod(options: argparse.Namespace) -> dict[str, float]:
     return {name: value for name in PAPER | STEERED if (value := getattr(options, name)) is not None}
 
 
+def _straight(options: argparse.Namespace, twist: float, duration: float) -> Problem:
+    """The rod of `_add_straight`."""
+    rod = untwisting_chain(options.n, options.rolling, options.ends, duration, twist, options.degree, **_rod(options))
+    return replace(rod, initial=replace(rod.initial, omega=options.omega), loads=command_line.given_loads(options))
+
+
 def show_modes(options: argparse.Namespace) -> None:
     """The command `modes`."""
-    straight = untwisting_chain(options.n, options.rolling, options.ends, twist=0.0, degree=options.degree, **_rod(options))
-    rolling = replace(straight.initial, omega=options.omega)
-    print(modes(replace(straight, initial=rolling, loads=command_line.given_loads(options)), options.count).table())
+    print(modes(_straight(options, 0.0, DURATION), options.count).table())
+
+
+def show_exponents(options: argparse.Namespace) -> None:
+    """The command `lyapunov`."""
+    found = lyapunov(_straight(options, options.twist, options.t), options.count, options.dt)
+    for exponent, error in zip(found.exponent, found.error, strict=True):
+        print(f"{exponent:11.4g} +- {error:.2g}")
+    print(f"an error of 1e-16 is 1e-3 after t = {found.horizon():.4g}")
 
 
 def run_twist(options: argparse.Namespace) -> None:

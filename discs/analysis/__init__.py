@@ -1,8 +1,9 @@
-"""Small motions about a state, and states at rest; see docs/small-motions.md."""
+"""Small motions about a state or a motion, and states at rest; see docs/small-motions.md."""
 
 from discs.analysis.linear import Linearised, linearise
+from discs.analysis.lyapunov import Exponents, lyapunov
 from discs.analysis.modes import Modes, modes
 from discs.analysis.rest import equilibrium
 from discs.analysis.steady import Steady, steady
 
-__all__ = ["Linearised", "Modes", "Steady", "equilibrium", "linearise", "modes", "steady"]
+__all__ = ["Exponents", "Linearised", "Modes", "Steady", "equilibrium", "linearise", "lyapunov", "modes", "steady"]

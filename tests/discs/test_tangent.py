@@ -1,0 +1,145 @@
+"""Tangents of steps, their transposes, and Lyapunov exponents."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discs import Chain, Problem, SimulationError, State, simulate
+from discs.__main__ import main
+from discs.analysis import lyapunov, modes
+from discs.analysis.tangent import STAGES, Flow
+from discs.chains.twist import untwisting_chain
+from discs.differences import slope
+from discs.loads import Damping, Motor, Rest, Torque, signals
+
+from ..conftest import Model, models, uneven
+
+CHAINS = [Model("consistent", "field"), Model("ring", "unit"), Model("springs", "true"), Model("ring", "steered")]
+
+
+def loaded(model):
+    problem = uneven(6, model)
+    omega = float(np.broadcast_to(problem.initial.omega, 6)[2])
+    loads = (
+        Damping(rolling=0.2, torsion=0.3, bending=0.1),
+        Torque(0.5, signals.sine(1.0, 2.0, 0.3)),
+        Rest(curvature=0.3),
+        Motor(lambda t: omega + 0.2 * np.sin(t), at=problem.chain.s[2]),
+    )
+    return replace(problem, loads=loads)
+
+
+@pytest.mark.parametrize("method", ["midpoint", "gauss4", "gauss8"])
+@models(CHAINS)
+def test_tangent_is_the_derivative_of_the_step(model, method):
+    problem = loaded(model)
+    if method == "midpoint" and not problem.system.quadratic:
+        with pytest.raises(ValueError, match=r"tangents of midpoint steps need a quadratic potential.*take 'gauss4'"):
+            Flow(problem, method)
+        return
+    flow, h, t = Flow(problem, method), 0.05, 0.3
+    _, tangent = flow.step(flow.start, t, h)
+    w, v = np.random.default_rng(2).normal(size=(2, flow.start.size))
+    right = slope(lambda size: flow.step(flow.start + size * v, t, h)[0], 0.3)
+    np.testing.assert_allclose(tangent.forward(v), right, rtol=0, atol=1e-8 * np.abs(right).max())
+    assert w @ tangent.forward(v) == pytest.approx(tangent.back(w) @ v, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", STAGES)
+def test_steps_are_those_of_the_integrators(method):
+    problem = replace(
+        uneven(7, Model("springs", "field")), duration=0.5, loads=(Damping(rolling=0.3), Torque(0.2, signals.ramp(0.0, 0.5)))
+    )
+    flow, y = Flow(problem, method), Flow(problem, method).start
+    for i in range(10):
+        y, _ = flow.step(y, 0.05 * i, 0.05)
+    run = simulate(problem, method, 0.05, 2, progress=False, engine="plain")
+    np.testing.assert_allclose(y[:21].reshape(3, 7), [run.x[-1], run.y[-1], run.theta[-1]], atol=1e-11)
+
+
+def test_steps_too_long_are_refused():
+    flow = Flow(uneven(6, Model("ring", "unit")))
+    with pytest.raises(SimulationError, match=r"did not converge.*smaller dt"):
+        flow.step(flow.start, 0.0, 50.0)
+
+
+def test_midpoint_steps_do_not_keep_the_volume():
+    """The flow keeps it. Gauss methods do to their order: the determinant of a step differs from 1 by O(h^3) and O(h^5)."""
+    problem = uneven(6, Model("springs", "field"))
+    for method, order in (("midpoint", 3), ("gauss4", 5)):
+        flow, off = Flow(problem, method), []
+        for h in (0.04, 0.02, 0.01):
+            _, tangent = flow.step(flow.start, 0.0, h)
+            off.append(abs(np.linalg.det(tangent.forward(np.eye(flow.start.size))) - 1))
+        assert off[0] > 1e-12
+        assert abs(np.log2(off[1] / off[2]) - order) < 0.6, off
+
+
+def rolling_ring(omega, loads=()):
+    chain = Chain(
+        n=5,
+        length=4.0,
+        density=1.3,
+        spin_inertia=0.9,
+        torsion_stiffness=0.8,
+        bending_stiffness=0.7,
+        radius=0.8,
+        ends="ring",
+        shift=(4.0, 0.0),
+    )
+    return Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, omega), 20.0, loads)
+
+
+def test_exponents_of_a_steady_motion_are_the_rates_of_its_modes():
+    problem = rolling_ring(0.6)
+    fastest = np.sort(modes(problem, count=16).rate.real)[-2:]
+    found = lyapunov(problem, count=2, dt=0.15, method="midpoint")
+    late = found.growth[-15:].mean(axis=0) / (5 * found.dt)  # the vectors have turned to their directions
+    np.testing.assert_allclose(late, fastest, rtol=0.03)
+    assert 1 < found.horizon(1e-10, 1e-4) * fastest[0] / np.log(1e6) < 1.4
+
+
+def test_sum_of_exponents_is_the_rate_of_the_volume():
+    """That of the steps: a midpoint step multiplies a mode by (1 + h sigma/2)/(1 - h sigma/2)."""
+    problem = rolling_ring(0.0, (Damping(rolling=0.6),))
+    found = lyapunov(problem, count=20, dt=0.2, method="midpoint")
+    rates = 0.5 * found.dt * modes(problem, count=9).rate
+    assert found.exponent.sum() == pytest.approx(np.log(np.abs((1 + rates) / (1 - rates))).sum() / found.dt, rel=1e-6)
+    assert found.exponent[0] < 0.02
+    assert found.horizon() == np.inf
+
+
+def test_spectrum_of_a_chain_is_symmetric():
+    """Without dampers the exponents add up to zero, and come in pairs to their errors."""
+    problem = untwisting_chain(4, "unit", duration=60.0)
+    problem = replace(problem, initial=replace(problem.initial, omega=np.array([1.0, 0.5, 1.2, 0.7])))
+    found = lyapunov(problem, count=16, dt=0.2, method="midpoint")
+    assert abs(found.exponent.sum()) < 1e-3
+    off = found.exponent + found.exponent[::-1]
+    assert (np.abs(off) < 4 * np.hypot(found.error, found.error[::-1])).all()
+    assert found.finite.shape == found.growth.shape == (60, 16)
+
+
+def test_bad_input():
+    problem = untwisting_chain(5)
+    with pytest.raises(ValueError, match=r"count must be at most 20.*got 21"):
+        lyapunov(problem, count=21)
+    with pytest.raises(ValueError, match=r"duration must be at least 20 intervals of 5 steps, 50, for an error bar; got 4\.5"):
+        lyapunov(problem, dt=0.5)
+    with pytest.raises(ValueError, match="lyapunov takes a Problem"):
+        lyapunov(problem.chain)
+    with pytest.raises(ValueError, match=r"method \(with tangents\) must be one of .*got 'rk4'"):
+        lyapunov(problem, method="rk4")
+    found = lyapunov(replace(problem, duration=2.0), dt=0.02)
+    with pytest.raises(ValueError, match="tolerance must be"):
+        found.horizon(tolerance=-1.0)
+
+
+def test_exponents_on_the_command_line(capsys):
+    assert main(["lyapunov", "--n", "4", "--t", "10", "--dt", "0.1", "--count", "2", "--rolling", "unit"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert len(out) == 3
+    assert "+-" in out[0]
+    assert main(["lyapunov", "--n", "4", "--t", "1", "--dt", "0.1"]) == 2
+    assert "take a longer duration" in capsys.readouterr().err
