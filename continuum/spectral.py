@@ -2,9 +2,10 @@
 
 The error is measured: a motion on m_j functions is compared with one on m_{j+1} functions, so each motion measures the one before.
 
-1. The tolerance of steps (`continuum.stepping`) falls for the first three motions, so that one difference shows the errors of
-   functions and of steps together. Then it is constant, and the errors of steps are measured by a separate motion. So they are
-   where the finer motion took no more steps than the coarser one, as its smaller tolerance shortened none.
+1. The tolerance of steps (`continuum.stepping`) falls to a fifth from motion to motion, so that one difference shows the errors of
+   functions and of steps together. After five motions (two if the initial fields are narrow) it is constant, and the errors of
+   steps are measured by a separate motion. So they are where the finer motion took no more steps than the coarser one, as its
+   smaller tolerance shortened none.
 2. If a difference is more than a third of the last one, a motion with shorter steps on the same functions shows which of the two
    errors dominates. If it is that of the steps, their tolerance falls again, and the number of functions goes back by one size.
 3. The finer motion has an error too. Let p be the ratio of its error to that of the coarser one. Then the difference d is (1 - p)
@@ -31,7 +32,7 @@ from continuum.hints import bent_hint, corner_hint, point_hint, points_inside, r
 from continuum.initial import resolve
 from continuum.motion import Motion, Runner, distances
 from continuum.rod import Scene
-from continuum.stepping import TooFast, coarser, finer, stages_for, sweeps
+from continuum.stepping import TooFast, stages_for, sweeps
 from continuum.wants import arrays, estimated
 from discs import SimulationError, Solution
 from discs.arrays import Float
@@ -40,6 +41,8 @@ from discs.running.stats import Stats
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
 SLOW, MORE = 259, (505, 707, 1001)  # from here on motions are slow, and taken only if the errors fall fast enough
 LOOSEST = 2e-4  # largest tolerance of a step
+FINER = 0.2  # ratio of the tolerances of steps of two motions; errors are about in proportion to it, so p is below LEAST
+ROUNDED = 1e-13  # smallest tolerance of a step: rounding hides the effect of smaller ones
 FAR = 100.0  # times the tolerance: for larger errors shorter steps are not tried
 LEAST, MOST = 1 / 3, 0.8  # limits of p, the error of a finer motion over that of the coarser one
 RATE = 0.5  # least p of omega
@@ -65,7 +68,7 @@ class Plan(NamedTuple):
     unknown: float
 
 
-PLAN = Plan(more=(3e-4, 3e-6, 3e-8), first=0.5, finer=2, slow=1 / 3, unknown=0.5)
+PLAN = Plan(more=(3e-4, 3e-6, 3e-8, 3e-10), first=0.5, finer=4, slow=1 / 3, unknown=0.5)
 # narrow fields send short waves through the rod: errors of the functions fall like n^-2.7, and a step passes many waves
 NARROW = Plan(more=(0.5, 2e-2, 3e-3, 3e-4, 3e-5, 2e-5), first=0.3, finer=1, slow=0.6, unknown=0.8)
 NARROW_STAGES = 12
@@ -104,10 +107,7 @@ class Search:
         start = sum(tol < below for below in self._plan.more)
         sizes = (SIZES + MORE)[min(start, len(SIZES) - 2) :]
         tolerance = min(self._plan.first * tol, LOOSEST)
-        stages = self.runner.stages
-        finest = tolerance
-        for _ in range(self._plan.finer):
-            finest = finer(finest, stages)
+        finest = tolerance * FINER**self._plan.finer
         last, failure = None, None
         for n, fewer in zip(sizes, (sizes[0], *sizes), strict=False):
             if self._hopeless(n, last, len(sizes[sizes.index(n) :])):
@@ -118,24 +118,25 @@ class Search:
                     before = self._change
                     if self._reached(last, found):
                         return last
-                    if self._plan.slow * before < self._change < FAR:
+                    if self._plan.slow * before < self._change < FAR and found.tolerance > ROUNDED:
                         shorter = self._run(n, found.tolerance / float(np.clip(2 * self._change, 4.0, 30.0)))
                         by_steps = over(distances(found.fields, shorter.fields), self._bound)
                         if by_steps > self._plan.slow * self._change:  # the steps dominate: shorter ones, functions as before
-                            last, found = self._run(fewer, coarser(shorter.tolerance, stages)), shorter
+                            last, found = self._run(fewer, shorter.tolerance / FINER), shorter
                             if self._reached(last, found):
                                 return last
-                            tolerance, finest = shorter.tolerance, finer(shorter.tolerance, stages)
+                            tolerance, finest = shorter.tolerance, FINER * shorter.tolerance
             except SimulationError as error:
                 if failure and abs(error.time - failure.time) <= SAME * failure.time:
                     # the earlier one, as rounding, which grows where r' vanishes, may have carried the other beyond the end
                     raise min(failure, error, key=lambda e: (isinstance(e, TooFast), e.time)) from None
                 failure, last, self._change = error, None, np.inf
                 continue
-            last, tolerance = found, max(finer(tolerance, stages), finest)
+            last, tolerance = found, max(FINER * tolerance, finest, ROUNDED)
         if failure:
             raise failure
-        raise ValueError(missed(self.estimate, self._bound, f"on {last.n if last else SIZES[-1]} functions"))
+        rounded = ", whose rounding may be the cause" if last and last.tolerance <= ROUNDED else ""
+        raise ValueError(missed(self.estimate, self._bound, f"on {last.n if last else SIZES[-1]} functions{rounded}"))
 
     def _hopeless(self, n: int, last: Motion | None, left: int) -> bool:
         """Whether n functions, and `left` sizes from there on, will not do.
@@ -192,7 +193,7 @@ class Search:
         """The motion on the same functions in more steps; a smaller tolerance may leave the number of a few steps as it is."""
         tolerance, found = motion.tolerance, motion
         for _ in range(4):
-            tolerance = finer(tolerance, self.runner.stages)
+            tolerance *= FINER
             found = self._run(motion.n, tolerance)
             if found.steps > MORE_STEPS * motion.steps:
                 break

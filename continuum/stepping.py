@@ -56,14 +56,13 @@ def stages_for(tol: float) -> int:
     return next(number for least, number in STAGES if tol >= least)
 
 
-def finer(tolerance: float, stages: int) -> float:
-    """A tolerance that makes steps about 1.5 times shorter, by their order s/2; errors of order 3 then fall to a third."""
-    return tolerance / min(float(1.5 ** (stages / 2 + 1)), 8.0)
+def rounding(rod: SpectralRod, h: float) -> float:
+    """What sweeps of a step of length h may leave by rounding, in units of the scale of the rod.
 
-
-def coarser(tolerance: float, stages: int) -> float:
-    """A tolerance that makes steps longer by the same factor."""
-    return tolerance**2 / finer(tolerance, stages)
+    The forces of the shortest waves, of about the wave number n/length, are rounded, and that moves the rod by eps n^4
+    (h/crossing)^2. Sweeps were seen to leave 0.008 to 0.1 of it (71 to 259 functions, h = 0.02 and 0.08).
+    """
+    return float(0.1 * np.finfo(float).eps * rod.n**4 * (h / rod.crossing) ** 2)
 
 
 def sweeps(tolerance: float) -> float:
@@ -201,7 +200,8 @@ class Steps:
 
     def _sweep(self, t: float, z: Phase, h: float) -> tuple[Phase, Float, Float, int]:
         assert self._modes is not None
-        return collocation.step(self.rod, z, self._modes, t, h, self._stages, SWEEPS, self._sweeps, bool(self._compiled))
+        tolerance = max(self._sweeps, min(rounding(self.rod, h), 0.1 * self._tolerance))
+        return collocation.step(self.rod, z, self._modes, t, h, self._stages, SWEEPS, tolerance, bool(self._compiled))
 
     def _advance(self, t: float, z: Phase) -> tuple[float, Phase, Float, Float]:
         """One converged step from z at t within the tolerance, with the rates and momenta of its stages."""
