@@ -25,11 +25,13 @@ class Strains(NamedTuple):
     matrix : B = ds/dq, sparse (springs, rows n); the columns are row after row of q.
     stiffness : (springs,).
     bent : sum over the springs of stiffness s grad^2 s, sparse (rows n, rows n); zero if V is quadratic.
+    strain : s, (springs,); grad V = B^T (stiffness s).
     """
 
     matrix: Matrix
     stiffness: Float
     bent: Matrix
+    strain: Float
 
 
 class Turn(NamedTuple):

@@ -176,7 +176,8 @@ class SteeredSystem(RollingDiscs):
         twice = mean.T @ diagonal(-(stress * u).sum(axis=0)) @ mean
         blank = 0 * twice
         bent = [[blank] * 3 + [mixed[0].T], [blank] * 3 + [mixed[1].T], [blank] * 4, [*mixed, blank, twice]]
-        return Strains(matrix, self._stiffness.ravel(), scipy.sparse.block_array(bent, format="csr"))
+        bent = scipy.sparse.block_array(bent, format="csr")
+        return Strains(matrix, self._stiffness.ravel(), bent, section.strain.ravel())
 
     def _strain(self, d: Float, middle: Float) -> Float:
         cos, sin, k = np.cos(middle), np.sin(middle), self._k

@@ -61,16 +61,18 @@ class LinearCurvature(LinkLaw):
         return tension
 
     def strains(self, d: Float) -> Strains:
-        return self._strains
+        bends = stencils.bends(d[:2], self._ends)
+        return self._strains._replace(strain=np.concatenate([bends[0], bends[1], d[2]]))
 
     @cached_property
     def _strains(self) -> Strains:
-        """Bends along x and along y, and twists."""
+        """Bends along x and along y, and twists; without their values."""
         n, ends = self._n, self._ends
         bend = stencils.matrix(lambda r: stencils.bends(stencils.links(r, ends), ends), n, ends)
         twist = stencils.matrix(lambda theta: stencils.links(theta, ends), n, ends)
         matrix = scipy.sparse.block_diag([bend, bend, twist], format="csr")
-        return Strains(matrix, np.concatenate([self.bend, self.bend, self.twist]), scipy.sparse.csr_array((3 * n, 3 * n)))
+        stiffness = np.concatenate([self.bend, self.bend, self.twist])
+        return Strains(matrix, stiffness, scipy.sparse.csr_array((3 * n, 3 * n)), np.empty(0))
 
     def stiffness(self, secant: Float, c: Float) -> Float:
         if self._order is not None:

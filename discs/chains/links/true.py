@@ -130,9 +130,9 @@ class TrueCurvature(LinkLaw):
             for a in (0, 1)
         ]
         blocks = [[link.T @ scipy.sparse.diags_array(part) @ link for part in row] for row in parts]
-        return Strains(
-            matrix.tocsr(), stiffness, scipy.sparse.block_diag([scipy.sparse.block_array(blocks), 0 * blocks[0][0]], format="csr")
-        )
+        bent = scipy.sparse.block_diag([scipy.sparse.block_array(blocks), 0 * blocks[0][0]], format="csr")
+        strain = np.concatenate([self._turning(d) - self._rest, length / k - 1, d[2] / k])
+        return Strains(matrix.tocsr(), stiffness, bent, strain)
 
     def stiffness(self, secant: Line, c: Float) -> Float:
         """Bends join a disc with its two neighbours, links join two discs."""
