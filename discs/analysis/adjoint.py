@@ -59,9 +59,9 @@ def gradient(
 
     Returns
     -------
-    {name: array of the shape of the parameter as it was given, or (n,) for the initial state}. A parameter that is one number for
-    all discs has one derivative. They are the derivatives of the computed cost, not only of the exact one, to the tolerance of the
-    sweeps of a step.
+    {name: array}, (n,) for the initial state, otherwise of the shape that the parameter has in the chain: (n,), (links,) or
+    (bends,). Where all discs share one number its derivative is the sum. They are the derivatives of the computed cost, not only of
+    the exact one, to the tolerance of the sweeps of a step.
 
     The plain engine runs; memory grows like the root of the number of steps.
 
@@ -248,11 +248,4 @@ class _Steps:
             for inertia in found.keys() & set(INERTIAS):
                 found[inertia] += shrink * basis_by(lin, inertia)[row]
         at_start = dict(zip(self.system.rows, q, strict=True)) | rates
-        result = {}
-        for name in names:
-            if name in INITIAL:
-                result[name] = at_start[name]
-            else:
-                shape, each = np.shape(getattr(problem.chain, name)), found[name]
-                result[name] = each.reshape(shape) if each.size == int(np.prod(shape)) else np.array(each.sum())
-        return result
+        return {name: at_start[name] if name in INITIAL else found[name] for name in names}
