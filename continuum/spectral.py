@@ -70,7 +70,7 @@ class Plan(NamedTuple):
 
 PLAN = Plan(more=(3e-4, 3e-6, 3e-8, 3e-10), first=0.5, finer=4, slow=1 / 3, unknown=0.5)
 # narrow fields send short waves through the rod: errors of the functions fall like n^-2.7, and a step passes many waves
-NARROW = Plan(more=(0.5, 2e-2, 3e-3, 3e-4, 3e-5, 2e-5), first=0.3, finer=1, slow=0.6, unknown=0.8)
+NARROW = Plan(more=(0.5, 2e-2, 3e-3, 3e-4, 3e-5, 2e-5), first=0.2, finer=1, slow=0.6, unknown=0.8)
 NARROW_STAGES = 12
 
 
