@@ -1,10 +1,10 @@
 r"""Gradients of a cost by the discrete adjoint: exact for the computed motion, in one pass back.
 
-A collocation step with K_i = f(Y_i), Y_i = y_n + h sum_j a_ij K_j, y_{n+1} = y_n + h sum_i b_i K_i has the adjoint
+A collocation step K_i = f(Y_i), Y_i = y_n + h sum_j a_ij K_j, y_{n+1} = y_n + h sum_i b_i K_i takes the derivative lambda_{n+1} of
+the cost back to that before the step by its transpose (`discs.analysis.tangent`), which has a u_i for each stage:
 
-    (1 - h J A)^T M = h b (x) lambda_{n+1},   lambda_n = lambda_{n+1} + sum_i J_i^T M_i,   dJ/dp += sum_i M_i . df/dp(Y_i),
+    lambda_n = lambda_{n+1} + sum_i u_i,   dJ/dp += sum_i M_i . df/dp(Y_i),   M_i = h (b_i lambda_{n+1} + sum_j a_ji u_j).
 
-with J_i = df/dy(Y_i), the matrix of the linearised equations (`discs.analysis.linear`) at stage i; the blocks of J A are J_i a_ij.
 The midpoint rule has one stage in the middle, where V is quadratic; otherwise it takes a secant, and Gauss methods are to be taken.
 (Sanz-Serna, Symplectic Runge-Kutta schemes for adjoint equations, SIAM Review 58, 2016.)
 """
@@ -14,15 +14,16 @@ from math import isqrt
 from typing import Any
 
 import numpy as np
-import scipy
 
 from discs import checks
 from discs.analysis.costs import RATES, cost_by_frame
 from discs.analysis.linear import Linearised
 from discs.analysis.parameters import INERTIAS, STIFFNESSES, Springs, basis_by, by_inertia
+from discs.analysis.tangent import tangent
 from discs.arrays import Float
 from discs.integrators import Integrator, Midpoint, Work, find
 from discs.integrators.collocated import Collocated, Common, collocate
+from discs.integrators.tableaux import tableau
 from discs.problem import Problem
 from discs.running.frames import frame_times, steps_before
 from discs.running.progress import NO_BAR, Progress
@@ -118,6 +119,7 @@ class _Steps:
 
     def __init__(self, problem: Problem, integrator: Any, h: float) -> None:
         self.problem, self.system, self.integrator, self.h = problem, problem.system, integrator, h
+        self.rule = tableau(1) if isinstance(integrator, Midpoint) else integrator.rule
         self.kept: dict[int, Phase] = {0: problem.start()}
         self.near: dict[int, Phase] = {}  # those of the last part that was asked for
         self.stride = 1
@@ -154,35 +156,32 @@ class _Steps:
         z = self.at(count)
         return self.step(z, count, rest) if rest else z
 
-    def stages(self, z: Phase, number: int, h: float) -> tuple[Float, Float, list[Linearised]]:
-        """The coefficients a and b of a step and the linearised equations at its stages."""
+    def stages(self, z: Phase, number: int, h: float) -> list[Linearised]:
+        """The linearised equations at the stages of a step."""
         t = number * self.h
         if isinstance(self.integrator, Midpoint):
             end = self.step(z, number, h)
             q, pi = 0.5 * (z.hi + z.lo + end.hi + end.lo), 0.5 * (z.pi + end.pi)
-            return np.array([[0.5]]), np.ones(1), [Linearised(self.problem, Phase(q, 0 * q, pi), t + 0.5 * h)]
-        rule = self.integrator.rule
+            return [Linearised(self.problem, Phase(q, 0 * q, pi), t + 0.5 * h)]
+        rule = self.rule
         guide = Common(self.system, z, t, h, rule)
         _, v, p, _ = collocate(self.system, z, t, h, rule, guide, self.integrator.sweeps, self.integrator.tolerance)
         q = z.hi + z.lo + h * np.tensordot(rule.a, v, 1)
         stages = zip(q, p, rule.nodes, strict=True)
-        return rule.a, rule.b, [Linearised(self.problem, Phase(at, 0 * at, pi), t + node * h) for at, pi, node in stages]
+        return [Linearised(self.problem, Phase(at, 0 * at, pi), t + node * h) for at, pi, node in stages]
 
     def adjoint(self, z: Phase, number: int, h: float, after: Float, found: dict[str, Float]) -> Float:
         """The derivative before a step from that after it; what parameters do in it is added to `found`."""
-        a, b, stages = self.stages(z, number, h)
-        one = scipy.sparse.eye_array(after.size)
-        jacobians = [lin.matrix for lin in stages]
-        blocks = [[one * float(i == j) - h * a[i, j] * jacobians[i] for j in range(b.size)] for i in range(b.size)]
-        whole = scipy.sparse.block_array(blocks, format="csc")
-        m = scipy.sparse.linalg.splu(whole).solve(np.outer(h * b, after).ravel(), trans="T").reshape(b.size, -1)
-        for lin, at in zip(stages, m, strict=True):
+        stages = self.stages(z, number, h)
+        step = tangent(self.rule, h, stages)
+        u = step.stages_back(after)
+        for lin, at in zip(stages, step.rates_back(after, u), strict=True):
             for name in found:
                 if name in INERTIAS:
                     found[name] += by_inertia(lin, at, name)
                 elif name in STIFFNESSES:
                     found[name] += self._springs(name).by_stiffness(lin, at)
-        before: Float = after + sum(jacobian.T @ at for jacobian, at in zip(jacobians, m, strict=True))
+        before: Float = after + u.sum(axis=0)
         return before
 
     def _springs(self, name: str) -> "Springs":

@@ -53,11 +53,28 @@ class Tangent:
 
     def back(self, w: Float) -> Float:
         """T^T w, for w (size,) or (size, m)."""
-        s, size = len(self.matrices), len(w)
-        right = np.concatenate([self.h * b * (a.T @ w) for a, b in zip(self.matrices, self.table.b, strict=True)])
-        stages = self.factors.solve(right, "T")
-        found: Float = w + np.sum([stages[j * size : (j + 1) * size] for j in range(s)], axis=0)
+        found: Float = w + self.stages_back(w).sum(axis=0)
         return found
+
+    def stages_back(self, w: Float) -> Float:
+        """u, (s, size) or (s, size, m): what changes of the stages' positions in phase space would add to w . y after the step."""
+        right = np.concatenate([self.h * b * (a.T @ w) for a, b in zip(self.matrices, self.table.b, strict=True)])
+        found: Float = self.factors.solve(right, "T").reshape(-1, *w.shape)
+        return found
+
+    def rates_back(self, w: Float, u: Float) -> Float:
+        """What changes of the stages' rates would add to w . y after the step: h (b_i w + sum_j a_ji u_j), of the shape of u."""
+        found: Float = self.h * (np.multiply.outer(self.table.b, w) + np.tensordot(self.table.a.T, u, 1))
+        return found
+
+
+def tangent(table: Tableau, h: float, stages: list[Linearised]) -> Tangent:
+    """The tangent of a step with these equations at its stages."""
+    matrices = [lin.matrix for lin in stages]
+    blocks = [[-h * weight * matrix for weight, matrix in zip(row, matrices, strict=True)] for row in table.a]
+    whole = scipy.sparse.block_array(blocks, format="csc")
+    factors = scipy.sparse.linalg.splu(scipy.sparse.eye_array(whole.shape[0], format="csc") + whole)
+    return Tangent(table, h, matrices, factors)
 
 
 class Flow:
@@ -96,21 +113,21 @@ class Flow:
     def step(self, y: Float, t: float, h: float) -> tuple[Float, Tangent]:
         """The state after a step from t to t + h, and the tangent of the step. SimulationError if its equations are not solved."""
         table, s, times = self.table, self.table.b.size, t + h * self.table.nodes
-        tangent = self._last
-        if tangent is None or tangent.h != h:
-            tangent = self._tangent([self.at(y, t)] * s, h)
+        now = self._last
+        if now is None or now.h != h:
+            now = self._tangent([self.at(y, t)] * s, h)
         stages = np.concatenate([y + c * h * self.at(y, t).rate for c in table.nodes])
         scale, before = np.max(np.abs(y)), np.inf
         for _ in range(SWEEPS):
             rates = np.array([self.at(part, time).rate for part, time in zip(stages.reshape(s, -1), times, strict=True)])
             off = (np.tile(y, s).reshape(s, -1) + h * table.a @ rates).ravel() - stages
-            change = tangent.factors.solve(off)
+            change = now.factors.solve(off)
             stages = stages + change
             moved = float(np.abs(change).max())
             if moved <= TOLERANCE * scale or not np.isfinite(moved):
                 break
             if moved > 0.3 * before:
-                tangent = self._tangent([self.at(part, time) for part, time in zip(stages.reshape(s, -1), times, strict=True)], h)
+                now = self._tangent([self.at(part, time) for part, time in zip(stages.reshape(s, -1), times, strict=True)], h)
             before = moved
         if not moved <= 1e3 * TOLERANCE * scale:
             disc = int(np.argmax(np.abs(change))) % self.problem.chain.n
@@ -118,13 +135,9 @@ class Flow:
                 "a step did not converge: it is too long for this motion; take a smaller dt", round(t / h), t, disc
             )
         here = [self.at(part, time) for part, time in zip(stages.reshape(s, -1), times, strict=True)]
-        self._last = tangent = self._tangent(here, h)
+        self._last = now = self._tangent(here, h)
         after: Float = y + h * table.b @ np.array([lin.rate for lin in here])
-        return after, tangent
+        return after, now
 
     def _tangent(self, stages: list[Linearised], h: float) -> Tangent:
-        matrices = [lin.matrix for lin in stages]
-        blocks = [[-h * weight * matrix for weight, matrix in zip(row, matrices, strict=True)] for row in self.table.a]
-        whole = scipy.sparse.block_array(blocks, format="csc")
-        factors = scipy.sparse.linalg.splu(scipy.sparse.eye_array(whole.shape[0], format="csc") + whole)
-        return Tangent(self.table, h, matrices, factors)
+        return tangent(self.table, h, stages)
