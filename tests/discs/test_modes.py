@@ -202,6 +202,14 @@ def test_a_motor_takes_an_unknown():
     assert np.abs(found.rate[0]) < np.abs(modes(problem, count=2).rate[0])  # clamped-free below free-free
 
 
+def test_places_off_by_less_than_rounding():
+    """Tiny numbers in place of zeros change nothing."""
+    problem = ring(9, "unit", 0.1, (Motor(0.1, at=0.0),))
+    tiny = 1e-30 * np.random.default_rng(7).normal(size=(2, 9))
+    off = replace(problem.initial, y=tiny[0], theta=tiny[1])
+    np.testing.assert_allclose(np.abs(modes(problem, 6, off).rate), np.abs(modes(problem, 6).rate), rtol=1e-9)
+
+
 def test_2048_discs_in_a_second():
     """0.36 s of the processor alone for 20 modes; error of the rates: that of rounding, 1e-8."""
     chain = Chain(n=2048, ends="consistent", **ROD)
