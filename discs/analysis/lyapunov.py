@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from discs import checks
-from discs.analysis.steady import Steady
-from discs.analysis.tangent import Flow
+from discs.analysis.tangent import Flow, units
 from discs.arrays import Float
 from discs.problem import Problem
 from discs.running.suggest import suggest_dt
@@ -93,7 +92,7 @@ def lyapunov(
             f"{problem.duration:g}: take a longer duration, a smaller dt, or fewer steps with every="
         )
     h = problem.duration / (intervals * every)
-    y, scale = flow.start, _scale(flow)
+    y, scale = flow.start, units(flow)
     vectors = np.linalg.qr(np.random.default_rng(seed).normal(size=(size, count)))[0]
     growth = np.empty((intervals, count))
     for i in range(intervals):
@@ -108,11 +107,3 @@ def lyapunov(
     means = np.array([block.mean(axis=0) for block in np.array_split(kept, BLOCKS)]) / (every * h)
     error: Float = means.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
     return Exponents(kept.mean(axis=0) / (every * h), error, t, growth, h)
-
-
-def _scale(flow: Flow) -> Float:
-    """Units of the unknowns, (size,): a length of the chain, a radian, and a momentum from the slowest rate."""
-    lin = flow.at(flow.start, 0.0)
-    slow = Steady(lin, np.zeros(2), 0.0).slow or 1 / flow.problem.duration
-    places = np.broadcast_to(lin.system.scale[:, None], lin.basis.shape)
-    return lin.join(places, (slow / lin.basis[2:]).reshape(lin.z.pi.shape))

@@ -126,7 +126,7 @@ def _rigid(lin: Linearised) -> tuple[Float, float]:
     matrix, right = np.concatenate(rows), np.concatenate(given)
     fit: Float = np.linalg.lstsq(matrix, right, rcond=None)[0]
     off, fastest = np.abs(matrix @ fit - right), np.abs(right).max()
-    if off.max() > CLOSE * fastest:
+    if off.max() > CLOSE * fastest + EPS * lin.system.scale[0] / lin.problem.duration:
         disc = int(np.argmax(off)) % n
         raise ValueError(
             "small motions are about an equilibrium or a steady motion, in which the chain moves as a rigid body; in the state "

@@ -18,6 +18,7 @@ import scipy  # its parts, slow to import, when they are used
 
 from discs import checks
 from discs.analysis.linear import Linearised
+from discs.analysis.steady import Steady
 from discs.arrays import Float, Matrix
 from discs.integrators.tableaux import Tableau, tableau
 from discs.problem import Problem
@@ -141,3 +142,11 @@ class Flow:
 
     def _tangent(self, stages: list[Linearised], h: float) -> Tangent:
         return tangent(self.table, h, stages)
+
+
+def units(flow: Flow) -> Float:
+    """Units of the unknowns, (size,): a length of the chain, a radian, and a momentum from the slowest rate."""
+    lin = flow.at(flow.start, 0.0)
+    slow = Steady(lin, np.zeros(2), 0.0).slow or 1 / flow.problem.duration
+    places = np.broadcast_to(lin.system.scale[:, None], lin.basis.shape)
+    return lin.join(places, (slow / lin.basis[2:]).reshape(lin.z.pi.shape))
