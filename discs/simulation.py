@@ -158,7 +158,8 @@ def _once(
 ) -> Solution:
     """One run; the arguments are those of `simulate`.
 
-    checked : estimate the error of the steps. more : further entries of `stats`. estimate : of the errors, if known.
+    checked : estimate the error of the steps; otherwise a search asks, whose frames are times. more : further entries of `stats`.
+    estimate : of the errors, if known.
     """
     want = () if want == () else wanted(want, integrator.offers)
     because = plain_because(problem, integrator, engine, want)
@@ -166,7 +167,7 @@ def _once(
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
         raise ValueError(f"dt must be at most the duration, {problem.duration:g}; got {h:g}")
-    times = frame_times(frames, problem.duration)
+    times = frame_times(frames, problem.duration) if checked else np.asarray(frames)
     end = float(times[-1])
     if end / h > MOST_STEPS:
         raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")

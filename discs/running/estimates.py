@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from discs.arrays import Float
-from discs.integrators import from_settings
 from discs.problem import Problem, State
 from discs.skew import SkewGradient
 from discs.solution import Solution
@@ -16,7 +15,7 @@ LEAST_ORDER = 0.5  # lower bound of an observed order; an error of this order or
 MOST_ORDER = 2.0  # upper bound of an order in an estimate; higher orders vary from run to run
 SAFETY = 1.5  # factor of estimates
 ROUNDED = 1e-12  # a quantity below it, in units of its scale, is rounding only
-SWEPT = 0.004  # part of a tolerance that sweeps may leave as an error
+SWEPT = 0.03  # part of a tolerance that sweeps may leave as an error
 LEFT = 0.5  # error that the sweeps of a step leave, in units of their tolerance; measured: at most 0.4 (rings), mostly 0.04
 LEFT_RATE = 10.0  # the same of a rate, in units of their tolerance over the step
 LEAST_SWEPT = 1e-16  # least tolerance of sweeps: rounding
@@ -25,9 +24,10 @@ RATES = ("omega", "phi_rate", "x_rate", "y_rate")
 DERIVED = (*RATES, "slope_x", "slope_y", "contact_force", "modified_energy")
 
 
-def differences(one: Solution, other: Solution) -> dict[str, float]:
-    """The largest difference of two runs over discs and frames, for every recorded quantity."""
-    return {name: float(np.abs(getattr(one, name) - getattr(other, name)).max()) for name in compared(one)}
+def differences(one: Solution, other: Solution, names: Iterable[str] | None = None) -> dict[str, float]:
+    """The largest difference of two runs over discs and frames, of some quantities; None for every recorded one."""
+    names = compared(one) if names is None else names
+    return {name: float(np.abs(getattr(one, name) - getattr(other, name)).max()) for name in names}
 
 
 def compared(run: Solution) -> list[str]:
@@ -49,10 +49,10 @@ def sizes(run: Solution, names: Iterable[str]) -> dict[str, float]:
     return {name: size(name) for name in names}
 
 
-def orders(earlier: Solution, run: Solution, finer: Solution, most: int) -> dict[str, float]:
+def orders(earlier: Solution, run: Solution, finer: Solution, most: int, names: Iterable[str] | None = None) -> dict[str, float]:
     """The order p of each quantity's error C h^p, from two runs and a third with shorter steps as reference."""
     shorter = math.log(earlier.stats["dt"] / run.stats["dt"])
-    before, after = differences(earlier, finer), differences(run, finer)
+    before, after = differences(earlier, finer, names), differences(run, finer, names)
     found = {}
     for name, off in after.items():
         order = math.log(before[name] / off) / shorter if off and before[name] else most if before[name] or not off else 0.0
@@ -60,27 +60,28 @@ def orders(earlier: Solution, run: Solution, finer: Solution, most: int) -> dict
     return found
 
 
-def errors(run: Solution, finer: Solution, order: Mapping[str, float]) -> dict[str, float]:
+def errors(
+    run: Solution, finer: Solution, order: Mapping[str, float], swept: float, names: Iterable[str] | None = None
+) -> dict[str, float]:
     """Estimated errors of a run, largest over discs and frames, from one with shorter steps; see `discs.running.tolerance`.
 
-    order : observed orders, 1 where one is missing. The errors left by sweeps are added. The error of a conserved energy is its
-        drift.
+    order : observed orders, 1 where one is missing. swept : tolerance of the sweeps of `run`; the errors that they leave are added.
+        The error of a conserved energy is its drift.
     """
     assert run.problem is not None
-    ratio, more = run.stats["dt"] / finer.stats["dt"], unswept(run)
+    ratio, more = run.stats["dt"] / finer.stats["dt"], unswept(run, swept)
     found = {}
-    for name, off in differences(run, finer).items():
+    for name, off in differences(run, finer, names).items():
         part = 1 - ratio ** -min(order.get(name, 1.0), MOST_ORDER)
         found[name] = SAFETY * off / part + more.get(name, 0.0)
-    if run.problem.conserves:
+    if run.problem.conserves and names is None:
         found["energy"] = float(np.abs(run.energy - run.problem.energy()).max())
     return found
 
 
-def unswept(run: Solution) -> dict[str, float]:
-    """Errors of positions, angles and their rates that the sweeps of a run may leave."""
+def unswept(run: Solution, tolerance: float) -> dict[str, float]:
+    """Errors of positions, angles and their rates that the sweeps of a run, to a tolerance, may leave."""
     assert run.problem is not None
-    tolerance = from_settings(run.stats["settings"]).sweep_tolerance
     return {name: tolerance * most for name, most in left(run.problem.system, run.stats["dt"], float(run.t[-1])).items()}
 
 

@@ -11,13 +11,14 @@ Input: a problem, tolerances and frames. Output: a run within the tolerances, wi
    resolved.
 3. Three runs give p: the last one is the reference for the errors of the two before. After two runs p = 1. Estimates use at most
    MOST_ORDER.
-4. If the estimate is within every tolerance, stop. Otherwise go to 2 with more steps, by a factor within GROWTH, such that C h^p is
-   the tolerance over AIM.
+4. If the estimate is within every tolerance, stop. Otherwise go to 2 with more steps, such that C h^p is the tolerance over AIM: by
+   a factor within GROWTH, or, if the run with shorter steps is finer than that needs, fewer steps than it has: it then is the
+   reference again. The p assumed is that of step 3, at least SLOWEST; after two runs it is `_usual`.
 5. The error has stalled if p is at most LEAST_ORDER, or if it does not fall below those before. After two stalls in a row "auto"
    takes a method of higher order. If there is none, a stalled run is repeated with initial positions moved by one unit in the last
    place. If they differ by a tenth of the error or more, or if sweeps that converged to rounding may leave as much, rounding is
-   the limit, and `NotReached` is raised. For tolerances below FINE this test is made as soon as errors are below RESOLVED; if the
-   difference exceeds the tolerance, no step can reach it.
+   the limit, and `NotReached` is raised. For tolerances below FINE, or after LATE runs, this test is made as soon as errors are
+   below RESOLVED; if the difference exceeds the tolerance, no step can reach it.
 6. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
    ends there, provided that its |r'| one step before is below ENDED and that two runs in a row lose it at the same time.
 
@@ -35,7 +36,7 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find, from_settings
+from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find
 from discs.problem import Problem
 from discs.running import estimates
 from discs.running.estimates import LEAST_ORDER
@@ -46,13 +47,16 @@ from discs.solution import Solution
 
 USUAL = 1e-3  # the default tolerance
 LEAST = 1e-12  # the least tolerance: some thousand times the rounding of a position
-LOOSE = 3e-4  # least tolerance at which "auto" begins with the midpoint method
-FEWEST = 20  # steps of the first run
+LOOSE = {3: 3e-4, 4: 3e-3}  # least tolerance at which "auto" begins with the midpoint method, by rows: slaved and own headings
+TIGHT = 5e-8  # largest tolerance at which "auto" begins with the last method
+FEWEST = 12  # steps of the first run
 PROBES = 101  # frames at which runs are compared during the search, at most
-GROWTH = 1.5, 3.0  # least and largest growth of the number of steps from run to run
+GROWTH = 1.5, 4.0  # least and largest growth of the number of steps from run to run
 AIM = 1.3  # the next run aims at the tolerance over this
 RESOLVED = 1e-2  # relative error below which the effect of rounding is tested
-FINE = 1e-6  # tolerance below which the effect of rounding is tested early
+FINE = 1e-9  # tolerance below which the effect of rounding is tested early
+LATE = 8  # runs after which it is tested in any case
+SLOWEST = 2.0  # least order by which the number of steps is chosen: a smaller one is that of waves that are not resolved yet
 ENDED = 0.01  # |r'| of a disc one step before it loses its heading; if it is larger, the step is too long
 ATTEMPTS, FAILURES = 28, 16  # runs at most, and failures among them
 COARSE = 4  # steps to a factor of two that searches side by side choose from: more runs then have the same step
@@ -72,10 +76,10 @@ def names(problem: Problem, want: Iterable[str] = ()) -> tuple[str, ...]:
     return (*system.rows, *system.rates[2:], *(name for key in want for name in WANTED.get(key, ())))
 
 
-def methods_for(method: str | Integrator, tol: float) -> tuple[Integrator, ...]:
-    """The integrators for a tolerance: the first one, and those to take after a stall."""
+def methods_for(method: str | Integrator, tol: float, rows: int = 3) -> tuple[Integrator, ...]:
+    """The integrators for a tolerance of a system with so many rows: the first one, and those to take after a stall."""
     if method == "auto":
-        return LADDER if tol >= LOOSE else LADDER[1:]
+        return LADDER if tol >= LOOSE[rows] else LADDER[1:] if tol > TIGHT else LADDER[2:]
     integrator = find(method)
     if integrator.adaptive:
         raise ValueError(f"{integrator.name} has tolerances of its own: {type(integrator).__name__}(rtol=..., atol=...)")
@@ -159,20 +163,29 @@ def search(
     SimulationError : if the motion ends before the last frame, or if runs fail with every step.
     """
     bound = checks.tolerances(tol, names(problem, want), problem.system.rows, LEAST)
-    integrator, *higher = methods_for(method, min(bound.values()))
+    integrator, *higher = methods_for(method, min(bound.values()), len(problem.system.rows))
     if not times[-1]:
         start = yield problem, integrator, problem.duration / FEWEST, times
         return _told(start, dict.fromkeys(estimates.compared(start), 0.0), tol, 1, "fewest steps")
     end, some = float(times[-1]), some_of(times)
     steps = _fewest(problem, integrator, end)
     runs: list[Solution] = []  # of one method, at most three, with shorter and shorter steps
+    sweeps: dict[float, Integrator] = {}  # the method with its tolerance of sweeps, by the step of a run
     size: dict[str, float] = {}
     failure: SimulationError | None = None
     looked, stalls, failures, best_yet = False, 0, 0, np.inf
+
+    def told(longer: Solution, shorter: Solution, limit: str) -> Solution:
+        """The run with longer steps, with estimates of all its errors."""
+        order = estimates.orders(runs[0], runs[1], runs[2], integrator.order) if len(runs) == 3 else {}
+        errors = estimates.errors(longer, shorter, order, sweeps[longer.stats["dt"]].sweep_tolerance)
+        return _told(longer, errors, tol, attempt, limit)
+
     for attempt in range(1, ATTEMPTS + 1):
         dt = end / steps
         swept = estimates.sweeps_to(problem, bound, size, dt, end)
-        sharp = _sharpened(integrator, isinstance(method, str), float(4.0 ** np.floor(0.5 * np.log2(swept))) if coarse else swept)
+        swept = float(4.0 ** np.floor(0.5 * np.log2(swept))) if coarse else swept
+        sharp = _sharpened(integrator, isinstance(method, str), swept)
         try:
             found = yield problem, sharp, dt, some
             failure = None
@@ -185,49 +198,51 @@ def search(
         if failure or found.stats["unconverged"]:
             steps, runs = 2 * steps, []
             continue
-        runs, size = [*runs[-2:], found], estimates.sizes(found, bound)
+        runs = sorted([*runs[-2:], found], key=lambda run: -run.stats["dt"])
+        size, sweeps[dt] = estimates.sizes(runs[-1], bound), sharp
         if len(runs) == 1:
             steps = 2 * steps + 1
             continue
-        first = len(runs) == 2
-        order = {} if first else estimates.orders(runs[0], runs[1], found, integrator.order)
-        longer = runs[-2]
-        errors = estimates.errors(longer, found, order)
+        first, longer, shorter = len(runs) == 2, runs[-2], runs[-1]
+        least, most = GROWTH
+        order = {} if first else estimates.orders(runs[0], runs[1], runs[2], integrator.order, bound)
+        swept = sweeps[longer.stats["dt"]].sweep_tolerance
+        errors = estimates.errors(longer, shorter, order, swept, bound)
         worst = _worst(errors, bound, size)
         if worst <= 1 and some.size < times.size:
-            pair = (from_settings(longer.stats["settings"]), longer.stats["dt"]), (sharp, dt)
-            longer = yield problem, *pair[0], times
-            shorter = yield problem, *pair[1], times
-            errors = estimates.errors(longer, shorter, order)
+            longer = yield problem, sweeps[longer.stats["dt"]], longer.stats["dt"], times
+            shorter = yield problem, sweeps[shorter.stats["dt"]], shorter.stats["dt"], times
+            errors = estimates.errors(longer, shorter, order, swept, bound)
             worst = _worst(errors, bound, estimates.sizes(shorter, bound))
-        left = _worst(estimates.unswept(longer), bound, size)
+        left = _worst(estimates.unswept(longer, swept), bound, size)
         limit = "fewest steps" if first else "sweeps" if left > worst / 2 else "tolerance"
-        best = _told(longer, errors, tol, attempt, limit)
         if worst <= 1:
-            return best
+            return told(longer, shorter, limit)
         seen = 1.0 if first else order[max(bound, key=lambda name: errors[name] / bound[name] / size[name])]
         stalls = stalls + 1 if not first and (seen <= LEAST_ORDER or worst >= best_yet) else 0
         best_yet = min(best_yet, worst)
-        resolved = min(bound.values()) < FINE and not looked and max(errors[name] / size[name] for name in bound) < RESOLVED
+        due = not looked and (attempt >= LATE or min(bound.values()) < FINE)
+        resolved = due and max(errors[name] / size[name] for name in bound) < RESOLVED
         if resolved or (stalls and not higher):
             looked = True
             other = yield estimates.nudged(problem), sharp, dt, found.t
             floor = _worst(estimates.differences(found, other), bound, size)
-            if sharp.sweep_tolerance <= estimates.LEAST_SWEPT:
-                floor = max(floor, _worst(estimates.unswept(found), bound, size))  # sweeps that converged to rounding
+            if sharp.sweep_tolerance <= estimates.LEAST_SWEPT:  # sweeps that converged to rounding
+                floor = max(floor, _worst(estimates.unswept(found, sharp.sweep_tolerance), bound, size))
             if floor > (1 if resolved else worst / 10):
-                raise NotReached(min(bound.values()), worst, best.stats["dt"], floor, best)
+                raise NotReached(min(bound.values()), worst, longer.stats["dt"], floor, told(longer, shorter, limit))
         if stalls >= 2 and higher:
             integrator, *higher = higher
             steps, runs, stalls, best_yet = max(FEWEST, steps // 4), [], 0, np.inf
             continue
-        least, most = GROWTH
-        wanted = longer.stats["steps"] * (AIM * worst) ** (1 / (integrator.order if first else max(seen, 1.0)))
-        wanted = np.clip(wanted, least * steps, most * steps)
+        wanted = longer.stats["steps"] * (AIM * worst) ** (1 / (_usual(integrator.order) if first else max(seen, SLOWEST)))
+        finest = shorter.stats["steps"]
+        if first or wanted > finest / least:
+            wanted = np.clip(wanted, least * finest, most * finest)
         steps = int(np.ceil(2.0 ** (np.ceil(COARSE * np.log2(wanted)) / COARSE) if coarse else wanted))
     if len(runs) < 2:
         raise failure or SimulationError(f"steps do not converge, down to dt = {dt:g}; take another method", 0, 0.0, 0)
-    raise NotReached(min(bound.values()), worst, best.stats["dt"], None, best)
+    raise NotReached(min(bound.values()), worst, longer.stats["dt"], None, told(longer, shorter, limit))
 
 
 def some_of(times: Float) -> Float:
@@ -260,6 +275,11 @@ class NotReached(SimulationError):
 def _sharpened(integrator: Integrator, free: bool, tolerance: float) -> Integrator:
     """The integrator with this tolerance of sweeps; unless `free`, with its own one if that is smaller."""
     return integrator.with_sweeps(tolerance if free else min(tolerance, integrator.sweep_tolerance))
+
+
+def _usual(order: int) -> float:
+    """The order that the first runs usually show, while some waves are not resolved."""
+    return min(order, 2 + order / 3)
 
 
 def _worst(errors: Mapping[str, float], bound: Mapping[str, float], size: Mapping[str, float]) -> float:

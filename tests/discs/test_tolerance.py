@@ -39,7 +39,8 @@ def true_error(problem, run):
 def test_the_true_error_is_within_the_tolerance(problem, tol):
     run = simulate(problem, "auto", tol=tol, frames=12, progress=False)
     assert true_error(problem, run) <= tol
-    assert run.stats["method"] == ("midpoint" if tol >= 3e-4 else "gauss6")
+    loose = 3e-3 if problem.chain.n == 33 else 3e-4  # own headings gain nothing by the midpoint method at 1e-3
+    assert run.stats["method"] == ("midpoint" if tol >= loose else "gauss6")
     assert run.stats["attempts"] >= 2
     assert run.stats["dt"] > 0
     assert set(run.error_estimate) >= {*problem.system.rows, "omega", "energy"}
@@ -136,7 +137,7 @@ def test_without_any_setting_a_run_is_to_a_thousandth():
 
 
 def test_where_a_thousandth_is_out_of_reach_that_is_a_warning(monkeypatch):
-    monkeypatch.setattr("discs.running.tolerance.ATTEMPTS", 4)
+    monkeypatch.setattr("discs.running.tolerance.ATTEMPTS", 5)
     problem = lump(untwisting_rod(twist=3.0), 33, "consistent")
     with pytest.warns(UserWarning, match=r"tol = 0.001 was not reached: the error is estimated at .*: this is the last run"):
         run = simulate(problem, progress=False)
@@ -194,11 +195,30 @@ def test_an_estimate_is_a_few_times_the_error():
         assert error <= max(estimate / np.abs(b).max() for estimate, _, b in parts) <= 5 * error
 
 
+@pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize(
+    "scene", [untwisting_rod(), untwisting_rod(rolling="unit"), steered_rod()], ids=["field", "unit", "steered"]
+)
+def test_a_search_costs_a_few_times_its_result(scene, tol):
+    """All runs together solve at most six times as many systems as the result, and none is made twice."""
+    made = []
+
+    def run(problem, integrator, dt, times):
+        made.append(simulate(problem, integrator, dt, times, progress=False))
+        return made[-1]
+
+    found = to_tolerance(lump(scene, 33), "auto", tol, np.array([4.5]), run)
+    assert sum(each.stats["solves"] for each in made) <= 6 * found.stats["solves"]
+    steps = [each.stats["steps"] for each in made]
+    assert max(steps) <= 4 * found.stats["steps"]
+    assert len(set(steps)) == len(steps)
+
+
 def test_what_limits_a_run_is_said_and_kept(tmp_path):
     problem = lump(untwisting_rod(duration=0.5), 5)
     for more in ({}, {"checkpoint": tmp_path / "run.nc"}, {"checkpoint": tmp_path / "run.nc"}):
         run = simulate(problem, "auto", tol=1e-2, frames=6, progress=False, **more)
-        assert (run.stats["limited_by"], run.stats["steps"]) == ("fewest steps", 20)
+        assert (run.stats["limited_by"], run.stats["steps"]) == ("fewest steps", 12)
     assert load(tmp_path / "run.nc").stats["limited_by"] == "fewest steps"
 
 
