@@ -2,9 +2,9 @@
 
 import time as clock
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +32,7 @@ from discs.warn import warn
 
 MOST_STEPS = 2.0**53
 Result = TypeVar("Result")
+Given = ParamSpec("Given")
 
 
 def simulate(
@@ -135,15 +136,21 @@ def run_fixed(problem: Problem, integrator: Integrator, dt: float, times: Float)
     return _run(problem, integrator, dt, times, (), False, "compiled", None, False)
 
 
-def _run(*arguments: Any) -> Solution:
-    """One run, as by `_once`; a plain one that its kernels overtake begins anew."""
-    try:
-        return _once(*arguments)
-    except Overtaken:
-        return _once(*arguments)
+def _anew(once: Callable[Given, Solution]) -> Callable[Given, Solution]:
+    """Decorator: a plain run that its kernels overtake begins anew."""
+
+    @wraps(once)
+    def run(*given: Given.args, **named: Given.kwargs) -> Solution:
+        try:
+            return once(*given, **named)
+        except Overtaken:
+            return once(*given, **named)
+
+    return run
 
 
-def _once(
+@_anew
+def _run(
     problem: Problem,
     integrator: Integrator,
     dt: float | None,
