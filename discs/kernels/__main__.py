@@ -36,7 +36,7 @@ def sharing(law: str, tested: bool = False) -> list[list[Integrator]]:
 
 KINDS = {"slaved": tuple(ROLLING), "own": ("own",)}  # of chains
 TESTED = {  # by the short suite
-    "field": ("midpoint", "gauss6", "rk4", "RK45", "DOP853"),
+    "field": tuple(METHODS),
     "unit": ("midpoint", "gauss6"),
     "own": ("midpoint", "gauss6"),
 }

@@ -258,6 +258,7 @@ def few(monkeypatch):
     return ran
 
 
+@pytest.mark.long
 def test_command_line_keeps_what_an_interrupt_leaves_and_goes_on(tmp_path, capsys, few):
     """An interrupt stops the processes of a sweep, see test_sweeps: here it comes during the 20th run."""
     command = ["stability", "--quick", "--quiet", "--seconds", "0.5", "--out", str(tmp_path)]

@@ -14,7 +14,7 @@ from discs import Chain, Midpoint, Problem, SimulationError, State, SteeredChain
 from discs.chains.twist import untwisting_chain
 from discs.integrators import METHODS
 from discs.running.frames import steps_before
-from tests.conftest import Model, models, uneven
+from tests.conftest import Model, longer, models, uneven
 
 PARAMETERS = {
     "n": 8,
@@ -148,7 +148,7 @@ def test_every_method_stops_at_the_collapse(method, engine):
     assert caught.value.time == pytest.approx(between)
 
 
-@pytest.mark.parametrize("engine", ["compiled", "plain"])
+@pytest.mark.parametrize("engine", [longer("compiled"), "plain"])
 @pytest.mark.parametrize("method", ["midpoint", "gauss6", "rk4"])
 def test_a_heading_is_lost_at_a_slope_of_a_thousandth(method, engine):
     """Three discs at rest, without springs, the outer two nearly in one place: only the threshold decides."""
