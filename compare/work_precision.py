@@ -102,7 +102,7 @@ class WorkPrecision:
                 (ours, mine), (peers, other) = (self.time_at(error, problem, n, whose, rms) for whose in (True, False))
                 if not np.isfinite(ours):
                     continue
-                ratio = f"{peers / ours:.0f}" if np.isfinite(peers) else "no peer"
+                ratio = f"{peers / ours:{'.0f' if peers > ours else '.2f'}}" if np.isfinite(peers) else "no peer"
                 there = f"{1e3 * peers:.3g} ms" if np.isfinite(peers) else "–"
                 lines.append(
                     f"| {problem} | {n} | {error:.0e} | {mine} | {1e3 * ours:.3g} ms | {other or '–'} | {there} | {ratio} |"

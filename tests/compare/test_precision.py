@@ -202,6 +202,8 @@ def test_times_at_equal_error():
     assert study.time_at(1e-4, "p", 8, False) == (pytest.approx(16.0), "b")
     assert study.time_at(1e-5, "p", 8, True)[0] == np.inf
     assert "| p | 8 | 1e-04 | a | 2e+03 ms | b | 1.6e+04 ms | 8 |" in study.speedups()
+    ahead = WorkPrecision([*rows, row("d", False, 1e-7, 0.5)], {("p", 8): 1e-12}, {})
+    assert "| p | 8 | 1e-04 | a | 2e+03 ms | d | 500 ms | 0.25 |" in ahead.speedups()
 
 
 def scipy_alone(problem: Problem) -> list[Peer]:

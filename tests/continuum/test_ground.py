@@ -201,6 +201,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_estimates_are_within_five_of_the_errors(name):
     scene = SCENES[name]
@@ -246,6 +247,7 @@ def test_estimates_of_rings_are_within_five_of_small_errors(rolling, initial, sh
     assert found.error_estimate["contact_force"] < 1e-3
 
 
+@pytest.mark.slow
 def test_frames_within_steps_are_as_accurate_as_steps():
     """Rates at frames within steps at the limit of stability: the polynomial of a step is less accurate there."""
     scene, frames = SCENES["own"], 31

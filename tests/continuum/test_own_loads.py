@@ -31,6 +31,7 @@ LOADS = HILLS, Custom(wind, per_length=True), Damping(rolling=0.1)
 STEERED = steered_rod(stretch_stiffness=10, shear_stiffness=10, heading_inertia=0.25, duration=1.0)
 
 
+@pytest.mark.slow
 def test_discs_with_own_headings_tend_to_the_elements():
     scene = replace(STEERED, loads=LOADS)
     field = solve(scene, 1e-6, frames=2, progress=False)

@@ -19,6 +19,8 @@ from tests.conftest import SLAVED, Model, longer, models, uneven
 from tests.discs.test_kernels import dense_banded
 from tests.discs.test_simulate_many import cloud
 
+pytestmark = pytest.mark.slow  # kernels as plain Python
+
 ROWS = "x", "y", "theta", "omega", "energy"
 ONES = "length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius"
 CLOSE = 3e-12  # as of the twins: what an unconverged sweep of a stiff step leaves

@@ -9,8 +9,9 @@ from discs import Problem, State
 from discs.analysis import modes, relative_equilibria
 from discs.chains.twist import untwisting_chain
 from discs.loads import Damping, Motor, Slope
+from tests.discs.test_modes import ring
 
-from .test_modes import ring
+pytestmark = pytest.mark.slow  # many steady motions
 
 VALUES = [0.0, 0.2, 0.5]
 

@@ -10,6 +10,8 @@ from discs.analysis import equilibrium, linearise, modes
 from discs.chains.twist import untwisting_chain
 from discs.loads import Damping, Motor, Potential, Rest, Slope, Spring, Torque, signals
 
+pytestmark = pytest.mark.slow  # chains come to rest
+
 LAWS = ["field", "unit", "own"]
 
 

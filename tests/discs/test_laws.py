@@ -211,6 +211,7 @@ def test_a_ring_that_has_become_a_point_is_refused_under_every_law_that_can_vani
             exact.ring(rod, [20.0], 0.4, law)
 
 
+@pytest.mark.slow
 def test_balances_hold_for_a_third_law(blend):
     """Momentum changes by its flux and the ground's force, which has the law's derivative in it, so a wrong one is seen."""
     ring = breathing_ring(blend, duration=0.4)

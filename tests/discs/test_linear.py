@@ -10,8 +10,9 @@ from discs.chains import stencils
 from discs.differences import jacobian
 from discs.loads import Custom, Damping, Motor, Potential, Rest, Slope, Spring, Torque, signals
 from discs.skew import Phase
+from tests.conftest import ALL, Model, models, uneven
 
-from ..conftest import ALL, Model, models, uneven
+pytestmark = pytest.mark.slow  # every chain with every load
 
 
 def everything(model, problem):

@@ -14,6 +14,9 @@ from discs.__main__ import main
 from discs.analysis import modes, steady
 from discs.chains.twist import untwisting_chain
 from discs.loads import Custom, Damping, Motor, Potential, Rest, Slope, Spring, Torque, signals
+from tests.conftest import longer
+
+pytestmark = pytest.mark.slow  # many chains, large ones among them
 
 ROD = {"length": 4.0, "density": 1.3, "spin_inertia": 0.9, "torsion_stiffness": 0.8, "bending_stiffness": 0.7, "radius": 0.8}
 BEAMS = {"heading_inertia": 0.25, "stretch_stiffness": 10.0, "shear_stiffness": 9.0}
@@ -94,7 +97,7 @@ def free_frequency(mode):
     return roots[(mode - (mode % 2)) // 2 if mode % 2 else mode // 2]
 
 
-@pytest.mark.parametrize("ends", ["springs", "consistent"])
+@pytest.mark.parametrize("ends", [longer("springs"), "consistent"])
 def test_free_rods_tend_to_the_field_at_order_2(ends):
     right = np.array([free_frequency(mode) for mode in range(3)])
     errors = []
@@ -108,7 +111,7 @@ def test_free_rods_tend_to_the_field_at_order_2(ends):
     assert (np.abs(orders - 2) < 0.12).all(), orders
 
 
-@pytest.mark.parametrize(("degree", "order"), [(1, 2), (2, 4)])
+@pytest.mark.parametrize(("degree", "order"), [longer(1, 2), (2, 4)])
 def test_elements_have_their_order(degree, order):
     """The differences of n, 2 n and 4 n discs fall like n^-order."""
     rates = [np.abs(modes(replace(p, initial=at_rest(p)), count=6).rate[::2]) for p in own_rods((17, 33, 65, 129), degree)]

@@ -12,8 +12,9 @@ from discs.analysis.tangent import STAGES, Flow
 from discs.chains.twist import untwisting_chain
 from discs.differences import slope
 from discs.loads import Damping, Motor, Rest, Torque, signals
+from tests.conftest import Model, models, uneven
 
-from ..conftest import Model, models, uneven
+pytestmark = pytest.mark.slow  # steps with sparse factors
 
 CHAINS = [Model("consistent", "field"), Model("ring", "unit"), Model("springs", "true"), Model("ring", "steered")]
 
