@@ -53,6 +53,7 @@ def empty_cache(tmp_path, monkeypatch):
         compiler.process.wait(60)
 
 
+@pytest.mark.slow
 def test_a_kernel_that_is_not_there_is_compiled_in_the_background(empty_cache, capfd):
     with readily(), pytest.raises(NotReady):
         doubled(1.5)
@@ -128,6 +129,7 @@ def test_a_run_is_plain_until_kernels_are_there_and_then_compiled(kernels_come):
     assert overtaken.stats["engine"] == "compiled"
 
 
+@pytest.mark.slow
 def test_a_field_goes_on_with_its_kernels(kernels_come):
     scene = untwisting_rod(duration=0.5)
     kernels_come(3)

@@ -52,6 +52,7 @@ def filled(q, a=None):
 
 
 @pytest.mark.parametrize("name", POTENTIALS)
+@pytest.mark.slow
 def test_forces_of_potentials_as_people_write_them(name):
     if name.startswith("jax"):
         pytest.importorskip("jax")

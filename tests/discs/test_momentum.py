@@ -231,6 +231,7 @@ def test_units_do_not_matter_for_what_the_constraints_leave(length):
     assert agreeing_multipliers(other, q / units, v / units).shape == agreeing_multipliers(system, q, v).shape
 
 
+@pytest.mark.slow
 def test_bad_input_is_refused():
     book = CLOSED["sleigh"]
     path = book.integrate(TIMES)

@@ -207,6 +207,7 @@ def test_lost_energy_is_said():
         pendulum().integrate([1, 0], [0, 0], np.linspace(0, 40, 5), 1e-2, method="RK23", progress=False)
 
 
+@pytest.mark.slow
 def test_stiff_problems_get_an_implicit_method():
     """A weight on a rod of stiffness 1e12 beside a slow oscillator, which sets the accuracy."""
 
@@ -220,6 +221,7 @@ def test_stiff_problems_get_an_implicit_method():
     assert path.stats["evaluations"] < 10_000
 
 
+@pytest.mark.slow
 def test_named_methods_agree_and_unknown_ones_are_refused():
     book = textbook.rolling_disc(1.3, 0.6, 0.4, 0.7, roll_rate=1.1, turn_rate=-0.8, slope=2.1)
     for method in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA"):
@@ -263,6 +265,7 @@ def test_a_potential_that_is_infinite_names_place_or_time():
         kepler.integrate([1, 0], [0, 0], [0.0, 1.0, 2.0], 1e-8, progress=False)
 
 
+@pytest.mark.slow
 def test_mass_is_checked_on_the_way():
     def mass(q):
         return np.diag([1.0, 1.0 - q[0]])

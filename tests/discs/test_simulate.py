@@ -32,6 +32,7 @@ FIXED = [name for name, cls in METHODS.items() if not cls.adaptive]
 
 
 @pytest.mark.parametrize("name", METHODS)
+@pytest.mark.slow
 def test_asking_for_frames_does_not_change_the_trajectory(name):
     problem = uneven(7, Model("springs", "unit"))
     few, many = (simulate(problem, name, 0.0037, frames=f, progress=False) for f in (2, 57))

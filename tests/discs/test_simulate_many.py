@@ -55,6 +55,7 @@ def test_each_run_is_that_of_simulate(how):
     assert len(runs[2:9:3]) == 3
 
 
+@pytest.mark.slow
 def test_a_failed_run_is_its_own_and_warnings_come_once():
     problems = cloud(6)
     problems[2], problems[4] = stiff(problems[2]), replace(problems[4], duration=0.005)
@@ -115,6 +116,7 @@ def test_runs_that_differ_have_no_common_arrays():
     np.testing.assert_array_equal(data.s.values, [problem.chain.s for problem in chains])
 
 
+@pytest.mark.slow
 def test_a_checkpoint_goes_on_to_the_same_bits(tmp_path, monkeypatch):
     problems, file = cloud(19), tmp_path / "runs.jsonl"
     problems[3] = stiff(problems[3])

@@ -29,6 +29,7 @@ TOO_LONG = [
 
 
 @pytest.mark.parametrize(("problem", "settled", "message"), TOO_LONG, ids=["twist", "one", "rolling", "many", "rough", "leapfrog"])
+@pytest.mark.slow
 def test_a_step_that_is_too_long_is_said(problem, settled, message):
     with pytest.warns(UserWarning, match=message) as heard:
         run = simulate(problem, **settled, progress=False)

@@ -174,6 +174,7 @@ def test_a_frame_that_was_changed_is_refused(saved):
         load(saved)
 
 
+@pytest.mark.slow
 def test_foreign_files_are_refused(tmp_path):
     (tmp_path / "text.nc").write_text("no run")
     xarray.Dataset({"x": ("time", [1.0])}).to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
