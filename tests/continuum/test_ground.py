@@ -96,6 +96,7 @@ def lopsided(s):
 
 
 @pytest.mark.parametrize("rolling", ["field", "unit"])
+@pytest.mark.slow
 def test_the_ground_alone_changes_momentum(rolling):
     """Momentum and angular momentum change by the force inside and by force and couple at the ends; energy by nothing."""
     middle, step = 1.9, 2e-4
@@ -301,6 +302,7 @@ def test_saved(tmp_path):
 
 
 @pytest.mark.parametrize("own", [False, True])
+@pytest.mark.slow
 def test_tolerances_bind_wanted_quantities(own):
     make = steered_rod if own else untwisting_rod
     scene, name = make(duration=1.0, **ROD), "end_force"

@@ -97,6 +97,7 @@ def waves(rate, c, eta):
     return np.concatenate([k, -k])
 
 
+@pytest.mark.slow
 def test_a_driven_end_responds_as_linear_waves():
     """A small torque tau e^{i rate t} at s = 0, resistance and viscosity, in the steady state: amplitude and phase to 1e-6.
 
@@ -123,6 +124,7 @@ def test_a_driven_end_responds_as_linear_waves():
     assert run.work[-1] == pytest.approx(run.dissipated[-1], rel=1e-5)  # in a period
 
 
+@pytest.mark.slow
 def test_a_torque_along_the_rod_responds_as_the_dispersion_relation_says():
     rate, c, eta, tau, q = 1.7, 0.3, 0.2, 3e-4, 2 * np.pi / ROD.length
     amplitude = tau * response(ROD, q, rate, c, eta)
@@ -175,6 +177,7 @@ def test_a_free_end_has_its_rest_curvature_and_a_known_stretch(rolling):
 
 
 @pytest.mark.parametrize("eta", [0.1, 20.0])
+@pytest.mark.slow
 def test_viscosity_damps_bending_waves_like_an_oscillator(eta):
     """y = R theta: M theta.. = -(beta q^2 + K R^2 q^4) theta - eta R^2 q^4 theta.; strong too, at few steps."""
     q, small = 2 * np.pi / ROD.length, 1e-5
@@ -186,6 +189,7 @@ def test_viscosity_damps_bending_waves_like_an_oscillator(eta):
     assert run.stats["steps"] < 200
 
 
+@pytest.mark.slow
 def test_viscosity_keeps_the_curvature_and_the_slope_of_free_ends(rolling):
     """And a ring that turns and breathes dissipates by breathing only: kappa = a^2/a_0^3, int eta kappa.^2 = l eta kappa.^2."""
     run = field(replace(untwisting_rod(rolling, **UNEVEN, duration=1.5), loads=(Damping(bending=0.3),)), 1e-8, 3)
@@ -201,6 +205,7 @@ def test_viscosity_keeps_the_curvature_and_the_slope_of_free_ends(rolling):
     assert np.abs(ring.dissipated - lost).max() < 1e-3 * lost[-1]
 
 
+@pytest.mark.slow
 def test_a_rod_on_the_arc_of_its_rest_curvature_stays_there(rolling):
     """Closed too, a ring of its own radius; both without energy."""
     a = ROD.length / (2 * np.pi)
@@ -277,6 +282,7 @@ def test_loaded_fields_are_saved_and_have_no_balances(tmp_path):
     np.testing.assert_array_equal(load(tmp_path / "loaded.nc").dissipated, run.dissipated)
 
 
+@pytest.mark.slow
 def test_a_ring_with_a_torque_stays_round(rolling):
     """A uniform torque and resistance on a ring: the work is that of the torque, and no wave grows."""
     scene = replace(breathing_ring(rolling, duration=0.3, radius=0.7), loads=(Torque(0.5), Damping(rolling=0.2)))

@@ -20,6 +20,7 @@ def compatible(s):
 
 
 @pytest.mark.parametrize("rolling", ["field", "unit"])
+@pytest.mark.slow
 def test_loads_on_a_stretched_rod(rolling):
     """d'Alembert's principle for eta = 1, s, s^2, in x and y, and a rotation, from frames, with the energy's own variation.
 
@@ -64,6 +65,7 @@ SMOOTH_MOTOR = Motor(lambda t: 0.25 + 0.3 * float(RAMP(t)), at=0.0)
 
 
 @pytest.mark.parametrize("loads", [LOADS, (Damping(bending=0.05), SMOOTH_MOTOR)], ids=["all", "motor"])
+@pytest.mark.slow
 def test_viscosity_of_bending_leaves_no_short_waves_in_the_force(loads):
     """Stiff dampers turn a rest of short waves into a force that grows with the number of functions; |r'| varies at the ends."""
     scene = Scene(rod=Rod(**ROD), initial=compatible, duration=0.8, rolling="field", loads=loads)
@@ -122,6 +124,7 @@ SHORT = "force at an end", "viscosity of bending"
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in SHORT else pytest.mark.long) for name in OWN])
+@pytest.mark.slow
 def test_loads_on_a_rod_with_own_headings(name):
     """<lambda, s^k> = int rho r.. s^k + n k s^(k-1) - F s^k up to k = 3, from frames and strains: 5e-7 to 6e-6 of length^k."""
     middle, step, length, stiffness = 0.8, 1e-3, 3.7, (8.0, 5.0)

@@ -10,6 +10,7 @@ from discs.loads import Torque
 from tests.continuum.test_loaded_fields import SMOOTH
 
 
+@pytest.mark.slow
 def test_a_point_load_inside_the_rod_is_refused_at_once_and_spread_it_is_not():
     scene = untwisting_rod(duration=1.5)
     words = r"not reached.*the load at the point s = 1.3 makes r'' jump there.*: spread it over a width, .*exp\(-\(\(s - 1.3\)/0.1"
