@@ -28,6 +28,7 @@ from discs.problem import Problem
 from discs.running.frames import frame_times, steps_before
 from discs.running.progress import NO_BAR, Progress
 from discs.running.suggest import suggest_dt
+from discs.simulation import simulate
 from discs.skew import Phase
 
 INITIAL = ("x", "y", "theta", "phi", "omega", "phi_rate")
@@ -64,7 +65,8 @@ def gradient(
     (bends,). Where all discs share one number its derivative is the sum. They are the derivatives of the computed cost, not only of
     the exact one, to the tolerance of the sweeps of a step.
 
-    The plain engine runs; memory grows like the root of the number of steps.
+    The run is made by `simulate` first, with its warnings and errors: where steps do not converge the gradient is as doubtful. The
+    pass back is on the plain engine; memory grows like the root of the number of steps.
 
     Raises
     ------
@@ -79,6 +81,7 @@ def gradient(
         raise ValueError(f"dt must be at most the duration {problem.duration:g}; got {h:g}")
     times = frame_times(frames, problem.duration)
     places = [steps_before(float(time), h) for time in times]
+    simulate(problem, integrator, h, times[-1:], progress=False, engine="ready")  # which warns of, or stops, what is no motion
     steps = _Steps(problem, integrator, h)
     with Progress("gradient", 2 * places[-1][0]) if progress else NO_BAR as bar:
         told = bar.update if bar else _unseen
@@ -122,7 +125,8 @@ class _Steps:
         self.rule = tableau(1) if isinstance(integrator, Midpoint) else integrator.rule
         self.kept: dict[int, Phase] = {0: problem.start()}
         self.near: dict[int, Phase] = {}  # those of the last part that was asked for
-        self.stride = 1
+        self.stride, self.count = 1, 0
+        self._known: dict[str, Springs] = {}
 
     def step(self, z: Phase, number: int, h: float) -> Phase:
         after: Phase = self.integrator.step(self.system, z, number * self.h, h, Work())
@@ -130,14 +134,12 @@ class _Steps:
 
     def forward(self, count: int, update: Callable[[int], None]) -> None:
         """Take `count` steps."""
-        self.stride, z = max(1, isqrt(count)), self.kept[0]
+        self.stride, self.count, z = max(1, isqrt(count)), count, self.kept[0]
         for number in range(count):
             z = self.step(z, number, self.h)
             if (number + 1) % self.stride == 0:
                 self.kept[number + 1] = z
             update(number + 1)
-        if not np.isfinite(z.pi).all():
-            raise ValueError("the run left what numbers can hold: a gradient needs a run that does not fail, try `simulate` first")
 
     def at(self, number: int) -> Phase:
         """The state after so many steps, computed again from the last one that was kept."""
@@ -146,7 +148,7 @@ class _Steps:
         if number not in self.near:
             first = number - number % self.stride
             self.near, z = {}, self.kept[first]
-            for later in range(first, min(first + self.stride, max(number, first + self.stride - 1))):
+            for later in range(first, min(first + self.stride - 1, self.count)):
                 z = self.step(z, later, self.h)
                 self.near[later + 1] = z
         return self.near[number]
@@ -185,8 +187,6 @@ class _Steps:
         return before
 
     def _springs(self, name: str) -> "Springs":
-        if not hasattr(self, "_known"):
-            self._known: dict[str, Springs] = {}
         if name not in self._known:
             self._known[name] = Springs(self.problem, name)
         return self._known[name]

@@ -118,9 +118,15 @@ def test_dual_numbers_carry_derivatives(function):
     ],
 )
 def test_bad_input(change, words):
-    given = {"cost": lambda run: run.x[-1, 0], "wrt": "theta", "dt": 0.5} | change
+    given = {"cost": lambda run: run.x[-1, 0], "wrt": "theta", "dt": 0.05} | change
     with pytest.raises(ValueError, match=words):
         gradient(uneven(5, Model("springs", "field")), **given, progress=False)
+
+
+def test_steps_that_do_not_converge_are_said():
+    problem = replace(uneven(6, Model("springs", "field")), duration=0.3)
+    with pytest.warns(UserWarning, match="did not converge"):
+        gradient(problem, lambda run: run.y[-1, 0], "theta", Midpoint(sweeps=2, tolerance=1e-14), 0.1, progress=False)
 
 
 def test_what_has_no_adjoint_is_refused():
