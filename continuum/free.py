@@ -94,4 +94,6 @@ def free_rod(
         if word:
             warnings.warn(word, stacklevel=2)
     stats: Stats = {"method": "midpoint and RATTLE", "order": 2, "dt": h, "steps": done.steps}
-    return Solution(t=times, s=chain.s, energy=done.energy, error_estimate=errors, stats=stats, problem=None, **done.fields)
+    return Solution(
+        t=times, s=chain.s, energy=done.energy, error_estimate=errors, stats=stats, problem=None, events=(), **done.fields
+    )

@@ -22,6 +22,7 @@ from discs.mechanics.lagrange import lagrange_dalembert
 from discs.problem import Problem, State
 from discs.running.ensemble import simulate_many
 from discs.running.failure import SimulationError
+from discs.running.moments import steps
 from discs.running.suggest import suggest_dt
 from discs.simulation import simulate
 from discs.solution import Solution
@@ -52,5 +53,6 @@ __all__ = [
     "load",
     "simulate",
     "simulate_many",
+    "steps",
     "suggest_dt",
 ]

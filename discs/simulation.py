@@ -1,7 +1,8 @@
 """`simulate(problem, method, ...)`: run a problem with an integrator."""
 
 import time as clock
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial, wraps
 from pathlib import Path
 from typing import ParamSpec, TypeVar
@@ -19,6 +20,7 @@ from discs.running.album import Album
 from discs.running.doubt import doubted
 from discs.running.engine import WAITING, Overtaken, plain_because
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
+from discs.running.moments import Event, checked_events, look_ahead
 from discs.running.progress import NO_BAR, Progress
 from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows, kept_settings
@@ -45,6 +47,7 @@ def simulate(
     engine: str | None = None,
     tol: float | Mapping[str, float] | None = None,
     checkpoint: str | Path | None = None,
+    events: Event | Sequence[Event] = (),
 ) -> Solution:
     """Run a problem.
 
@@ -66,6 +69,9 @@ def simulate(
     checkpoint : a file, as "run.nc", to which frames are written as they are computed, in bounded memory. If it exists, its run
         continues where it was interrupted, to the same bits as one unbroken run; see docs/archives.md. With a tolerance, method and
         step are found first, by runs of at most 101 frames in memory; a run that continues takes them from its file.
+    events : functions of a `discs.events.Moment` that are zero when something happens, own ones or those of `discs.events`;
+        `run.events` tells when. One with `terminal = True` ends the run there. They need a method with fixed steps; "auto" is then
+        "gauss6". The run is first done step by step to find them, see `discs.running.moments`.
     engine : "compiled", which waits until kernels are compiled, once on a machine; "plain" for NumPy and SciPy; "auto", the
         default: compiled if the kernels are there, otherwise plain while they are compiled in the background, and compiled from the
         start as soon as they are there; "ready", the same, but nothing is compiled. Both agree up to rounding (with step control to
@@ -88,12 +94,17 @@ def simulate(
     if not isinstance(problem, Problem):
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
     engine, nothing = engine or usual(), method is None and dt is None
+    if events != ():
+        events = checked_events(events)
+        method = "gauss6" if method == "auto" or nothing else method
     if engine == "auto" and checkpoint is not None:
         engine = "compiled"
     if method == "auto" or tol is not None or nothing:
         if dt is not None:
             raise ValueError("give dt or tol, not both: tol (and method='auto') finds the step")
-        found, doubt = _search(problem, method or "auto", frames, want, progress, engine, tol, checkpoint)
+        found, doubt = _search(problem, method or "auto", frames, want, progress, engine, tol, checkpoint, events)
+    elif events:
+        found, doubt = _eventful(problem, find(method or "midpoint"), dt, frames, want, progress, engine, checkpoint, events), ""
     else:
         found, doubt = _run(problem, find(method or "midpoint"), dt, frames, want, progress, engine, checkpoint), ""
     if warning := doubted(problem, found) + doubt:
@@ -110,6 +121,7 @@ def _search(
     engine: str,
     tol: float | Mapping[str, float] | None,
     checkpoint: str | Path | None,
+    events: Sequence[Event],
 ) -> tuple[Solution, str]:
     """A run to a tolerance, and its warning or "". The arguments are those of `simulate`."""
 
@@ -124,11 +136,34 @@ def _search(
         return _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched), ""
     looked_at = times if checkpoint is None else some_of(times)
     found, doubt = answered(search_with_doubt(problem, method, tol, looked_at, want), run)
-    if checkpoint is not None:
+    if checkpoint is not None or events:
         integrator, dt = from_settings(found.stats["settings"]), found.stats["dt"]
         searched, known = of_search(found.stats), found.error_estimate
+        if events:
+            return _eventful(problem, integrator, dt, times, want, progress, engine, checkpoint, events, searched, known), doubt
         found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched, known)
     return found, doubt
+
+
+def _eventful(
+    problem: Problem,
+    integrator: Integrator,
+    dt: float | None,
+    frames: int | ArrayLike,
+    want: Iterable[str],
+    progress: bool,
+    engine: str,
+    checkpoint: str | Path | None,
+    events: Sequence[Event],
+    more: Stats | None = None,
+    estimate: dict[str, float] | None = None,
+) -> Solution:
+    """A run with events, until one that ends it; the arguments are those of `simulate` and `_run`."""
+    h = suggest_dt(problem, integrator) if dt is None else dt
+    happened, times = look_ahead(problem, integrator, h, frame_times(frames, problem.duration), events, engine)
+    told: Stats = (more or {}) | {"events": [(each.name, each.t) for each in happened]}
+    found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, more is None, told, estimate)
+    return replace(found, events=happened, error_estimate=estimate)
 
 
 def run_fixed(problem: Problem, integrator: Integrator, dt: float, times: Float) -> Solution:

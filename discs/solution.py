@@ -6,7 +6,7 @@ Its methods for pictures and files import `discs.pictures` and `discs.files` whe
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -67,6 +67,15 @@ class Result:
         return archive.to_xarray(self)
 
 
+class Occurrence(NamedTuple):
+    """An event of a run. event : its number among those given. name : in words. t : time. state : of the discs."""
+
+    event: int
+    name: str
+    t: float
+    state: State
+
+
 @dataclass(frozen=True, eq=False)
 class Solution(Result):
     """A motion at F frames of N discs (or of a field on N nodes). Time is the first axis, discs are the last.
@@ -107,6 +116,8 @@ class Solution(Result):
     balance_by_load : (F, 2, L), both, as recorded.
     reaction : (F, motors), torque of each motor, about the axle or the vertical; None without motors.
     modified_energy : (F,), the invariant of "leapfrog" at the last step before a frame; want "modified_energy".
+    events : what happened, in order of time, of simulate(..., events=...): event (its number), name, t and state. Files keep the
+        names and times, in stats["events"].
     problem : the problem of discs; of a field by "richardson", the one on the finest mesh; otherwise None.
     error_estimate : estimated largest error over discs (or nodes) and frames, by quantity; None if it was not estimated.
     """
@@ -139,6 +150,7 @@ class Solution(Result):
     reaction: Float | None = None
     error_estimate: dict[str, float] | None = None
     problem: Problem | None = None
+    events: tuple[Occurrence, ...] = ()
 
     @property
     def discs(self) -> "Solution":
@@ -194,7 +206,7 @@ class Solution(Result):
                 f"frames of a run are picked by a slice, a mask or numbers of frames, at least one of the {self.t.size} and in "
                 f"order of time; got {checks.shown(frames)}; of one frame take run[i : i + 1], or its state, run.state(i)"
             )
-        whole = ("s", "stats", "error_estimate", "problem")
+        whole = ("s", "stats", "error_estimate", "problem", "events")
         rows = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in whole}
         return replace(self, **{name: value[frames] for name, value in rows.items() if value is not None})
 

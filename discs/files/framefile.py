@@ -169,6 +169,7 @@ class FrameFile:
             stats=self.attrs["stats"] | missing,
             error_estimate=self.attrs["error_estimate"],
             problem=problem or self.problem,
+            events=(),
             **rows,
         )
 

@@ -58,13 +58,13 @@ def observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> 
     t = march.step * march.h + tau
     found = march.observe(t, frame)
     if want:
-        found |= _asked(march, frame, t, want, found)
+        found |= asked(march, frame, t, want, found)
     if offered:
         found |= march.integrator.extras(march.system, march.memory, march.h)
     return found
 
 
-def _asked(march: March, frame: Frame, t: float, want: tuple[str, ...], seen: dict[str, Any]) -> dict[str, Any]:
+def asked(march: March, frame: Frame, t: float, want: tuple[str, ...], seen: dict[str, Any]) -> dict[str, Any]:
     """The quantities in `want`, at a frame where those in `seen` are known."""
     system, rate = march.system, frame.rate
     shape = system.shape(frame.hi, frame.lo)

@@ -23,6 +23,7 @@ class Stats(TypedDict, total=False):
     dt_suggested: bool  # whether dt was chosen by `suggest_dt`
     tol: float | dict[str, float]  # the tolerance asked for
     attempts: int  # runs made to reach the tolerance
+    events: list[tuple[str, float]]  # name and time of each event
     limited_by: str  # what determined the accuracy: "tolerance", "fewest steps" or "sweeps", see `discs.running.tolerance`
 
     # cost
