@@ -224,7 +224,7 @@ def _run(
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
-    stepwise = isinstance(integrator, OneStep) and integrator.twin_of(system, None) is None
+    stepwise = isinstance(integrator, OneStep)
     recorded = (stepwise or integrator.runs_whole) and checkpoint is None and not want and system.load is None
     there = bool(because) or kernels(engine, problem, integrator, h, not recorded, not progress)
     if not there:

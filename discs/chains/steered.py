@@ -257,3 +257,12 @@ class SteeredSystem(RollingDiscs):
 
         load = () if self.load is None else (self.load.parameters,)
         return steered.parameters(self._chain, self.weights, self._roots, self.scale, self._shift, self._stiffness, *load)
+
+    @cached_property
+    def lanes(self) -> Parameters:
+        """The same parameters in lanes (`discs.kernels.steered_lanes`), for methods that take them; None for few or very many."""
+        if self.load is not None or self._degree != 1:
+            return None
+        from discs.kernels import steered_lanes, steered_passes  # noqa: F401, the sweeps
+
+        return steered_lanes.arranged(self.parameters) if steered_lanes.MANY <= self.n <= steered_lanes.MOST else None

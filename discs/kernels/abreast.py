@@ -65,6 +65,25 @@ def _previous(order, v):
     return v
 
 
+@fill(orders.present, Abreast)
+def _present(order, i):
+    return 1.0
+
+
+@fill(orders.record, Abreast)
+def _record(order, state, v, energy, slip, spare, q, rates, told):
+    for row in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            q[row, i] = state.hi[row, i] + state.lo[row, i]
+    for row in range(rates.shape[0]):
+        for i in range(rates.shape[1]):
+            rates[row, i] = v[row + 2, i]
+    for k, value in enumerate((energy, slip)):
+        store(spare, 0, value)
+        for lane in range(LANES):
+            told[LANES * k + lane] = spare[lane]
+
+
 @fill(orders.join, Abreast)
 def _join(order, ring, x):
     end = HALO + LANES * order.rows
@@ -112,6 +131,16 @@ def _pull_ends(order, springs, base, half, c, g):
             for k in range(4):
                 i = start + way * k
                 store(g, i, load(g, i) + END[k] * load(c[axis], i) * force)
+
+
+@fill(orders.bend_ends, Abreast)
+def _bend_ends(order, springs, base, still):
+    energy, last = zero(), LANES * (order.rows - 1)
+    for end in range(2):
+        for axis in range(2):
+            moment = end_moment(base[axis], still[axis], 0 if end == 0 else last, end)
+            energy = energy + load(springs, LANES * end) * (moment * moment)
+    return energy
 
 
 @part

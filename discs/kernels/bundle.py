@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from discs.kernels import driver, shared, slaved_stages  # noqa: F401, the sweeps
 from discs.kernels import protocol as do
-from discs.kernels.abreast import Abreast, end_moment
+from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill
 from discs.kernels.lanes import HALO
 from discs.kernels.slaved import Slaved
 from discs.kernels.slaved_lanes import Bundle, apart
-from discs.kernels.slaved_matrix import GHOST, RING
+from discs.kernels.slaved_matrix import RING
 from discs.kernels.vectors import LANES, larger, load, store, zero
 
 
@@ -99,34 +99,3 @@ def _judge(chain, start, end, place, defect):
         for j in range(LANES * row, LANES * (row + 1)):
             worst = max(worst, defect[0, j] / (defect[1, j] if defect[1, j] > 0 else 1.0))
     return worst
-
-
-@fill(do.frame, Bundle)
-def _frame(chain, work, state, c, v, q, rates, told):
-    """For each chain: told (2 LANES,), the energies and largest slips."""
-    do.rate(state, chain, work, c, 1.0, v)
-    x, y, theta = work.base[0], work.base[1], work.base[2]
-    energy, slip, n = zero(), zero(), chain.radius.size
-    for i in range(0, n, LANES):
-        j = HALO + i
-        bend_x, bend_y = load(x, j + LANES) - load(x, j), load(y, j + LANES) - load(y, j)
-        twist, p, rate = load(theta, j), load(state.pi[0], i), load(v[2], i)
-        energy = energy + load(chain.bend, j) * (bend_x * bend_x + bend_y * bend_y) + load(chain.torsion, j) * (twist * twist)
-        energy = energy + p * p
-        turn = rate / load(c[2], i)
-        off_x, off_y = load(v[0], i) - load(c[0], i) * turn, load(v[1], i) - load(c[1], i) * turn
-        slip = larger(np.sqrt(off_x * off_x + off_y * off_y), slip)
-        for row in range(3):
-            store(q[row], i, load(state.hi[row], i) + load(state.lo[row], i))
-        store(rates[0], i, rate)
-    if chain.ends == GHOST:
-        still = work.half[0]
-        still[:] = 0.0
-        for end in range(2):
-            start = 0 if end == 0 else n - LANES
-            bend_x, bend_y = end_moment(x, still, start, end), end_moment(y, still, start, end)
-            energy = energy + load(chain.springs, LANES * end) * (bend_x * bend_x + bend_y * bend_y)
-    for k, value in enumerate((0.5 * energy, slip)):
-        store(chain.spare, 0, value)
-        for lane in range(LANES):
-            told[LANES * k + lane] = chain.spare[lane]

@@ -22,28 +22,30 @@ from numpy.typing import NDArray
 
 from discs.kernels import blocks, orders
 from discs.kernels.compiled import fill, part
+from discs.kernels.shared import disc_by_disc
 from discs.kernels.steered_matrix import border, solve_border
-from discs.kernels.vectors import LANES, after, before, load, store
+from discs.kernels.vectors import LANES, after, before, largest, load, store, total, zero
+from discs.skew import Phase
 
 HALO = 2 * LANES
 LEAD = LANES + 1  # rows that may be coupled around a ring
 
 
 class Order(NamedTuple):
-    """The order of n discs in lanes. places : (n,), the entries of the discs."""
+    """The order of n discs in lanes. places : (n,), the entries of the discs. inner : (LANES,), 1 but 0 in the first lane."""
 
     n: int
     rows: int
     first: int
     places: NDArray
+    inner: NDArray
 
 
 class Matrix(NamedTuple):
     """A factored matrix, real or complex, (n',) in lanes: 1/a, u/a, w/a, p/a, q/a.
 
-    lead : (2, LANES LEAD), couplings around a ring, 0 elsewhere. inner : (LANES,), 1 but 0 in the first lane. corner : (2,). ends :
-    (2, 4), multipliers and reciprocal pivots of the end discs. d, o, columns, edge : of the separators, see
-    `discs.kernels.steered_matrix`. rest : (2, LANES), their right side.
+    lead : (2, LANES LEAD), couplings around a ring, 0 elsewhere. corner : (2,). ends : (2, 4), multipliers and reciprocal pivots of
+    the end discs. d, o, columns, edge : of the separators, see `discs.kernels.steered_matrix`. rest : (2, LANES), their right side.
     """
 
     a: NDArray
@@ -52,7 +54,6 @@ class Matrix(NamedTuple):
     p: NDArray
     q: NDArray
     lead: NDArray
-    inner: NDArray
     corner: NDArray
     ends: NDArray
     d: NDArray
@@ -66,25 +67,63 @@ def order(n: int) -> Order:
     """The order of n discs."""
     rows = -(-n // LANES)
     first = LANES * rows - n
-    j = np.arange(first, n + first)
-    return Order(n, rows, first, j % rows * LANES + j // rows)
+    j, inner = np.arange(first, n + first), np.ones(LANES)
+    inner[0] = 0.0
+    return Order(n, rows, first, j % rows * LANES + j // rows, inner)
+
+
+# Forms of `discs.kernels.protocol` for chains in this order
+
+
+def place(chain, i):
+    return chain.order.places[i]
+
+
+def enter(chain, state):
+    n, (rows, columns) = LANES * chain.order.rows, (state.hi.shape[0], state.pi.shape[0])
+    own = Phase(np.zeros((rows, n)), np.zeros((rows, n)), np.zeros((columns, n)))
+    for array, to in ((state.hi, own.hi), (state.lo, own.lo), (state.pi, own.pi)):
+        for row in range(array.shape[0]):
+            for i in range(array.shape[1]):
+                to[row, chain.order.places[i]] = array[row, i]
+    return own
+
+
+def leave(chain, own, state):
+    for array, to in ((own.hi, state.hi), (own.lo, state.lo), (own.pi, state.pi)):
+        disc_by_disc(chain, array, to)
 
 
 @fill(orders.matrices, Order, _nrt=True)
 def matrices(order, g, count):
-    n, kind, inner = LANES * order.rows, np.array([g]).dtype, np.ones(LANES)
-    inner[0] = 0.0
+    n, kind = LANES * order.rows, np.array([g]).dtype
     a, u, w, p, q = np.zeros((5, count, n), kind)
     lead, corner, ends = np.zeros((count, 2, LANES * LEAD), kind), np.zeros((count, 2), kind), np.zeros((count, 2, 4), kind)
     d, o, rest = np.zeros((count, 3, LANES), kind), np.zeros((count, 4, LANES), kind), np.zeros((count, 2, LANES), kind)
     columns, edge = np.zeros((count, 2, 2, LANES), kind), np.zeros((count, 11), kind)
-    return Matrix(a, u, w, p, q, lead, inner, corner, ends, d, o, columns, edge, rest)
+    return Matrix(a, u, w, p, q, lead, corner, ends, d, o, columns, edge, rest)
 
 
 @fill(orders.pick, Matrix)
 def pick(m, j):
     lead, corner, ends, d, o, columns, edge = m.lead[j], m.corner[j], m.ends[j], m.d[j], m.o[j], m.columns[j], m.edge[j]
-    return Matrix(m.a[j], m.u[j], m.w[j], m.p[j], m.q[j], lead, m.inner, corner, ends, d, o, columns, edge, m.rest[j])
+    return Matrix(m.a[j], m.u[j], m.w[j], m.p[j], m.q[j], lead, corner, ends, d, o, columns, edge, m.rest[j])
+
+
+@fill(orders.present, Order)
+def _present(order, i):
+    return load(order.inner, 0) if i < LANES * order.first else 1.0 + zero()
+
+
+@fill(orders.record, Order)
+def _record(order, state, v, energy, slip, spare, q, rates, told):
+    for i in range(order.n):
+        j = order.places[i]
+        for row in range(q.shape[0]):
+            q[row, i] = state.hi[row, j] + state.lo[row, j]
+        for row in range(rates.shape[0]):
+            rates[row, i] = v[row + 2, j]
+    told[0], told[1] = total(energy, spare), largest(slip, spare)
 
 
 @fill(orders.previous, Order)
@@ -156,7 +195,7 @@ def factor(order, ring, ghosts, m):
         i, end = LANES * order.first, last + LANES - 1
         lead[0, i], lead[1, i], lead[1, i + LANES] = w[end - LANES], u[end], w[end]
     # the couplings of the first rows to the separators before them: those of the lane before
-    inner = load(m.inner, 0)
+    inner = load(order.inner, 0)
     p0 = load(lead[0], 0) + inner * before(load(w, last - LANES))
     q0 = load(lead[1], 0) + inner * before(load(u, last))
     p1, q1 = load(lead[0], LANES), load(lead[1], LANES) + inner * before(load(w, last))

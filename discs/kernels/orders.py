@@ -33,6 +33,17 @@ def rejoin(order, base, move, to):
 
 
 @stub
+def present(order, i):
+    """1 where the row that begins at the entry i belongs to a disc, elsewhere 0."""
+
+
+@stub
+def record(order, state, v, energy, slip, spare, q, rates, told):
+    """Record a frame, see `protocol.frame`, of a state with velocities v; energy and slip are vectors, parts of the energy and of
+    the largest slip of one chain, or those of each."""
+
+
+@stub
 def close_links(order, ends, x):
     """Set the links of x or y before the first disc and after the last one, and those before `first`, whose headings are then those
     of disc 0."""
@@ -41,6 +52,11 @@ def close_links(order, ends, x):
 @stub
 def pull_ends(order, springs, base, half, c, g):
     """Add the forces of the bending springs of consistent ends, after the move `half` from the links `base`, to g (n',)."""
+
+
+@stub
+def bend_ends(order, springs, base, still):
+    """The energy of these springs twice, as a vector like `record` takes; `still` (2, n' + 2 HALO) are zeros."""
 
 
 @stub

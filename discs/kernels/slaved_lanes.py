@@ -10,17 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from discs.kernels import lanes
 from discs.kernels import protocol as do
 from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO, Order, order
 from discs.kernels.limits import LOST_HEADING
 from discs.kernels.orders import close_links, first_links, join, matrices, pick, previous, rejoin
-from discs.kernels.shared import disc_by_disc
 from discs.kernels.slaved import Slaved
 from discs.kernels.slaved_matrix import GHOST, RING
 from discs.kernels.vectors import LANES, after, load, store
-from discs.skew import Phase
 
 MANY = 64  # discs from which lanes are used; they need rows of two discs behind `Order.first`
 MOST = 100_000  # discs up to which they are: they take half as much memory again, 0.3 GiB for a million discs
@@ -93,20 +92,20 @@ def apart(chain: Slaved) -> tuple[NDArray, NDArray, NDArray]:
 def arranged(chain: Slaved) -> Laned:
     """The parameters in lanes, for linear curvature."""
     n, ring = chain.radius.size, chain.ends == RING
-    lanes, links = order(n), chain.links
+    own, links = order(n), chain.links
 
     def put(values: NDArray, rest: float = 0.0, halo: int = 0) -> NDArray:
-        to = np.full((*values.shape[:-1], LANES * lanes.rows + 2 * halo), rest)
-        to[..., halo + lanes.places] = values[..., :n]
+        to = np.full((*values.shape[:-1], LANES * own.rows + 2 * halo), rest)
+        to[..., halo + own.places] = values[..., :n]
         if halo:
-            join(lanes, ring, to)
+            join(own, ring, to)
         return to
 
     weights = put(chain.weights)
     weights[2, weights[2] == 0.0] = 1.0  # what belongs to no disc
     bend, torsion, springs = apart(chain)
     return Laned(
-        lanes,
+        own,
         put(chain.radius),
         weights,
         put(bend, halo=HALO),
@@ -157,31 +156,9 @@ def _pick(chain, m, j):
     return pick(m, j)
 
 
-@fill(do.place, Laned)
-def _place(chain, i):
-    return chain.order.places[i]
-
-
-@fill(do.enter, Laned, _nrt=True)
-def _enter(chain, state):
-    n = chain.radius.size
-    own = Phase(np.zeros((3, n)), np.zeros((3, n)), np.zeros((1, n)))
-    for array, to in ((state.hi, own.hi), (state.lo, own.lo), (state.pi, own.pi)):
-        for row in range(array.shape[0]):
-            for i in range(array.shape[1]):
-                to[row, chain.order.places[i]] = array[row, i]
-    return own
-
-
-@fill(do.leave, Laned)
-def _leave(chain, own, state):
-    for array, to in ((own.hi, state.hi), (own.lo, state.lo), (own.pi, state.pi)):
-        disc_by_disc(chain, array, to)
-
-
-@fill(do.frame, Laned)
-def _frame(chain, work, state, c, v, q, rates, told):
-    pass  # frames of discs in lanes are not recorded on the way: `simulate` asks for each
+fill(do.place, Laned)(lanes.place)
+fill(do.enter, Laned, _nrt=True)(lanes.enter)
+fill(do.leave, Laned)(lanes.leave)
 
 
 @fill(do.settle, *LANED)

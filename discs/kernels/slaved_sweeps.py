@@ -9,7 +9,7 @@ from discs.kernels import protocol as do
 from discs.kernels.abreast import END
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO, Order
-from discs.kernels.orders import corners, factor, join, pick, pull_ends, solve, wrap
+from discs.kernels.orders import bend_ends, corners, factor, join, pick, present, pull_ends, record, solve, wrap
 from discs.kernels.shared import reach
 from discs.kernels.slaved_lanes import LANED, moved
 from discs.kernels.slaved_matrix import GHOST, RING
@@ -97,16 +97,32 @@ def pulled(chain, work, c, g):
         pull_ends(chain.order, chain.springs, base, half, c, g)
 
 
+@part
+def end_moment(order, base, half, end):
+    """As in `discs.kernels.abreast`."""
+    moment, last = 0.0, order.n - 1
+    for k, share in enumerate((-2.0, 3.0, -1.0)):  # of the three links from the end inwards
+        i = HALO + order.places[k + 1 if end == 0 else last - k]
+        j = HALO + order.places[k if end == 0 else last - k - 1]
+        moment += share * (base[i] + (half[i] - half[j]))
+    return moment
+
+
+@fill(bend_ends, Order)
+def _bend_ends(order, springs, base, still):
+    energy = 0.0
+    for end in range(2):
+        for axis in range(2):
+            energy += springs[end] * end_moment(order, base[axis], still[axis], end) ** 2
+    return (1.0 - load(order.inner, 0)) * energy  # in one lane
+
+
 @fill(pull_ends, Order)
 def _pull_ends(order, springs, base, half, c, g):
     last = order.n - 1
     for end in range(2):
         for axis in range(2):
-            moment = 0.0
-            for k, share in enumerate((-2.0, 3.0, -1.0)):  # of the three links from the end inwards
-                i = HALO + order.places[k + 1 if end == 0 else last - k]
-                j = HALO + order.places[k if end == 0 else last - k - 1]
-                moment += share * (base[axis, i] + (half[axis, i] - half[axis, j]))
+            moment = end_moment(order, base[axis], half[axis], end)
             for k, share in enumerate(END):
                 i = order.places[k if end == 0 else last - k]
                 g[i] += c[axis, i] * (share if end == 0 else -share) * springs[end] * moment
@@ -213,3 +229,23 @@ def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
 @fill(do.correct, *LANED)
 def _correct(chain, matrix, r):
     solve(chain.order, chain.ends == RING, chain.ends == GHOST, matrix, r[0])
+
+
+@fill(do.frame, *LANED)
+def _frame(chain, work, state, c, v, q, rates, told):
+    do.rate(state, chain, work, c, 1.0, v)
+    x, y, theta = work.base[0], work.base[1], work.base[2]
+    energy, slip = zero(), zero()
+    for i in range(0, chain.radius.size, LANES):
+        j = HALO + i
+        bend_x, bend_y = load(x, j + LANES) - load(x, j), load(y, j + LANES) - load(y, j)
+        twist, p, rate = load(theta, j), load(state.pi[0], i), load(v[2], i)
+        elastic = load(chain.bend, j) * (bend_x * bend_x + bend_y * bend_y) + load(chain.torsion, j) * (twist * twist)
+        energy = energy + present(chain.order, i) * (elastic + p * p)
+        turn = rate / load(c[2], i)
+        off_x, off_y = load(v[0], i) - load(c[0], i) * turn, load(v[1], i) - load(c[1], i) * turn
+        slip = larger(np.sqrt(off_x * off_x + off_y * off_y), slip)
+    if chain.ends == GHOST:
+        work.half[:] = 0.0
+        energy = energy + bend_ends(chain.order, chain.springs, work.base, work.half)
+    record(chain.order, state, v, 0.5 * energy, slip, work.spare, q, rates, told)

@@ -35,9 +35,14 @@ def pair(v, w):
     return v + 1j * w
 
 
+def chosen(v, w, a, b):
+    """The entries of a where v > w, elsewhere those of b."""
+    return np.where(v > w, a, b)
+
+
 def larger(v, w):
     """The larger entries; those of w where v is not a number."""
-    return np.where(v > w, v, w)
+    return chosen(v, w, v, w)
 
 
 def before(v):
@@ -57,6 +62,16 @@ def largest(v, spare):
     m = spare[0]
     for i in range(1, LANES):
         m = spare[i] if spare[i] > m else m
+    return m
+
+
+@part
+def total(v, spare):
+    """The sum of the entries of a vector; `spare` (LANES,) is overwritten."""
+    store(spare, 0, v)
+    m = 0.0
+    for i in range(LANES):
+        m += spare[i]
     return m
 
 
@@ -173,11 +188,11 @@ def _forms() -> None:
         return types.void(a, types.intp, v), emit
 
     @intrinsic
-    def _larger(typing: Any, v: Any, w: Any) -> Any:
+    def _chosen(typing: Any, v: Any, w: Any, a: Any, b: Any) -> Any:
         def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return builder.select(builder.fcmp_ordered(">", *args), *args)
+            return builder.select(builder.fcmp_ordered(">", *args[:2]), *args[2:])
 
-        return vector(v, w), emit
+        return vector(v, w, a, b), emit
 
     def turn(by: int) -> Any:
         @intrinsic
@@ -204,7 +219,8 @@ def _forms() -> None:
     overload(load)(lambda a, i: lambda a, i: _load(a, i))
     overload(store)(lambda a, i, v: lambda a, i, v: _store(a, i, v))
     overload(pair)(lambda v, w: lambda v, w: _pair(v, w))
-    overload(larger)(lambda v, w: lambda v, w: _larger(v, w))
+    overload(chosen)(lambda v, w, a, b: lambda v, w, a, b: _chosen(v, w, a, b))
+    overload(larger)(lambda v, w: lambda v, w: _chosen(v, w, v, w))
     overload(np.sqrt)(lambda x: (lambda x: root(x)) if isinstance(x, Vector) else None)
     overload(abs)(lambda x: (lambda x: size(x)) if isinstance(x, Vector) else None)
 
