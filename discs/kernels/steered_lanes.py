@@ -1,7 +1,7 @@
 """Discs with their own headings in lanes: one chain (`discs.kernels.lanes`) or several (`discs.kernels.abreast`).
 
-`discs.kernels.steered_passes` has their sweeps; `discs.kernels.steered` is the same disc by disc, for few discs, elements of degree 2
-and other methods.
+`discs.kernels.steered_passes` has their sweeps; `discs.kernels.steered` is the same disc by disc, for few discs, elements of degree
+2 and other methods.
 
 A link is in the row of the disc after it.
 """
