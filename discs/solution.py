@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from discs import checks
-from discs.arrays import Float
+from discs.arrays import Float, Int
 from discs.problem import Problem, State
 from discs.running.stats import Stats
 from discs.running.step_error import doubts
@@ -195,7 +195,7 @@ class Solution(Result):
             f"{''.join(f'; {doubt}' for doubt in doubts(self.stats))})"
         )
 
-    def __getitem__(self, frames: slice | Float | Sequence[int]) -> "Solution":
+    def __getitem__(self, frames: slice | Float | Int | Sequence[int]) -> "Solution":
         """The run at some of its frames, in order of time. They are given by a slice, a mask (F,) or frame numbers."""
         try:
             picked = np.arange(self.t.size)[frames]

@@ -41,7 +41,7 @@ def shot(page: Path, to: Path, t: float) -> None:
     browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=shutil.which("chromedriver")))
     try:
         browser.get(page.as_uri())
-        browser.execute_script("discs.go(arguments[0])", t)
+        browser.execute_script("discs.play(false); discs.go(arguments[0])", t)
         time.sleep(2)
         browser.save_screenshot(str(to))
     finally:

@@ -47,8 +47,8 @@ def animate(
     path : file to write: .mp4 (H.264, by the ffmpeg of imageio-ffmpeg) or .gif (by Pillow).
     fps : pictures per second.
     progress : show a progress bar after one second.
-    radius : of the drawn discs, length. None takes an eighteenth of the rod; the movie shows the value. The spokes turn by the true
-        theta, so a disc that is drawn too small appears to slide.
+    radius : of the drawn discs, length. None takes an eighteenth of the rod, of few discs more; the movie shows the value. The
+        spokes turn by the true theta, so a disc that is drawn too small appears to slide.
     discs : approximate number of discs drawn with their tracks; all, if there are fewer than twice as many. The rod is drawn whole.
     azimuth, elevation : direction of view, degrees.
     size : width and height in pixels, even; by default 1280 x 720, or 800 x 450 for a .gif.

@@ -70,7 +70,7 @@ def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int 
     ----------
     instants : number of times.
     discs : approximate number of discs drawn; all, if there are fewer than twice as many.
-    radius : half the length of a bar; None takes an eighteenth of the rod.
+    radius : half the length of a bar; None takes an eighteenth of the rod, of few discs more.
     """
     ax = given_or_new(ax, 6.4, 4.8)
     frames = geometry.instants(run, checks.whole("instants", instants, 1))

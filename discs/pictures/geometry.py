@@ -77,12 +77,13 @@ def instants(run: Solution, count: int) -> Int:
 def drawn_radius(run: Solution, radius: float | None) -> float:
     """The radius to draw discs with: as given, or an eighteenth of the rod, so that large discs do not hide each other.
 
-    A single disc is drawn with its true radius or, if that is unknown or 0, with an eighteenth of the size of its path.
+    Of fewer than seven discs it is a third of their spacing. A single disc is drawn with its true radius or, if that is unknown or
+    0, with an eighteenth of the size of its path.
     """
     if radius is not None:
         return checks.number("radius", radius, positive=True)
     if run.s.size > 1:
-        return float(np.ptp(run.s)) / 18
+        return float(np.ptp(run.s)) / min(18, 3 * (run.s.size - 1))
     return _radius(run) or float(max(np.ptp(run.x), np.ptp(run.y))) / 18 or 1.0
 
 

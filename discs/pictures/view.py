@@ -24,8 +24,11 @@ from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.pictures import geometry
-from discs.pictures.style import BLUE, GREY, GROUND, INK, LABEL, ORANGE, SIGNED, UNSIGNED
+from discs.pictures.style import BLUE, INK, LABEL, ORANGE, UNSIGNED
 from discs.solution import Result, Solution
+
+SAND = "#e8d59a"  # the middle of the scale of signed values: no white, which would look as if it had no colour
+MOST_FRAMES, MOST_POSES = 5000, 200_000  # of a run in a page: frames, and frames times drawn discs, of 32 bytes each
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +75,12 @@ def view(
     path : file to write, .html; None writes nothing.
     beside : another run, shown to the right at the same time and from the same place.
     titles : strings, one for each run; by default the method and the number of discs.
-    radius : of the drawn discs, length. None takes an eighteenth of the rod; the page shows the value. The spokes turn by the true
-        theta, so a disc that is drawn too small appears to slide.
+    radius : of the drawn discs, length. None takes an eighteenth of the rod, of few discs more; the page shows the value. The
+        spokes turn by the true theta, so a disc that is drawn too small appears to slide.
     discs : approximate number of discs drawn of each run, with the rod through them; all, if there are fewer than twice as many.
+
+    The page plays when it is opened, unless the reader's system asks for less motion. Of a run with more than 5000 frames, or
+    200 000 positions of drawn discs (3000 frames of 65), equally spaced frames are shown, and the page says how many.
 
     The ground's force can be chosen if both runs recorded it, want=("contact_force",).
 
@@ -98,7 +104,7 @@ def view(
     data = {
         "runs": [_data(r, title, about, size) for r, title in zip(runs, titles, strict=True)],
         "radius": size,
-        "style": {"ink": INK, "grey": GREY, "ground": GROUND, "runs": [BLUE, ORANGE], "signed": SIGNED, "unsigned": UNSIGNED},
+        "style": {"ink": INK, "signed": (BLUE, SAND, ORANGE), "unsigned": UNSIGNED},
         "label": LABEL,
     }
     parts = {
@@ -139,7 +145,8 @@ def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
         if values is not None and not np.isfinite(values).all():
             frame = int(np.argwhere(~np.isfinite(values))[0, 0])
             raise ValueError(f"a page needs finite values; {name} is not at frame {frame} of {title!r}: view the frames before it")
-    shown = geometry.picked(run.s, about)
+    shown, frames, drift = geometry.picked(run.s, about), run.t.size, float(np.abs(run.energy - run.energy[0]).max())
+    run = run[geometry.instants(run, max(2, min(MOST_FRAMES, MOST_POSES // shown.size)))]
     axle, slope = geometry.axles(run), geometry.slopes(run)
     arrays = {
         "x": run.x,
@@ -158,7 +165,8 @@ def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
         "held": geometry.off_between_frames(run, size) > geometry.TOO_FAR,
         "t": run.t.tolist(),
         "energy": run.energy.tolist(),
-        "drift": float(np.abs(run.energy - run.energy[0]).max()),
+        "drift": drift,
+        "frames": frames,
         "arrays": {name: _packed(values[:, shown]) for name, values in arrays.items()},
     }
 

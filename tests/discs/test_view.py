@@ -60,6 +60,23 @@ def test_page_holds_the_run(run):
     assert page.path is None
 
 
+def test_of_many_frames_some_are_shown(run):
+    """100 001 frames of six discs, made of one: the page would be 24 MB."""
+    t = np.linspace(0, 1, 100_001)
+    many = {name: np.repeat(getattr(run, name)[:1], t.size, axis=0) for name in ("x", "y", "theta", "omega", "energy")}
+    long = Solution(t=t, s=run.s, **many)
+    page = long.view()
+    (held,) = data_of(page)["runs"]
+    assert len(held["t"]) == 5000
+    assert [held["t"][0], held["t"][-1], held["frames"]] == [0.0, 1.0, 100_001]
+    assert np.ptp(np.diff(held["t"])) < 1.1e-5  # equally spaced, up to one frame
+    assert len(page.page) < 3e6
+    wide = {name: np.zeros((4000, 129)) for name in ("x", "y", "theta", "omega")}
+    wide["x"] = wide["x"] + np.linspace(0, 1, 129)
+    some = Solution(t=t[:4000], s=np.linspace(0, 1, 129), energy=np.zeros(4000), **wide)
+    assert len(data_of(some.view())["runs"][0]["t"]) == 200_000 // 129
+
+
 def test_page_is_small_and_takes_nothing_from_outside(run):
     page = run.view().page
     assert len(page.encode()) < 1.2e6
@@ -108,6 +125,7 @@ def test_one_disc_from_above():
     with pytest.raises(ValueError, match="panel must be one of 'motion', 'end', 'energy'; got 'theta'"):
         single().plot("theta")
     assert geometry.drawn_radius(single(), None) == 0.7
+    assert geometry.drawn_radius(pair(), None) == pytest.approx(1 / 3)
 
 
 @pytest.mark.parametrize(

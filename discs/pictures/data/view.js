@@ -5,6 +5,8 @@
   const at = (id) => document.getElementById(id);
   const stage = at("stage"), scrub = at("scrub");
   const R = data.radius;
+  const tone = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); // a colour of view.css
+  const kinds = ["first", "second"];
   const runs = data.runs.map((run) => ({ ...run, ...unpack(run.arrays) }));
   const start = Math.min(...runs.map((run) => run.t[0])), end = Math.max(...runs.map((run) => run.t.at(-1)));
 
@@ -30,8 +32,10 @@
     if (signed) { high = Math.max(high, -low) || 1; low = -high; }
     if (high - low < 1e-6 * Math.abs(high) + 1e-30) { low -= 0.5; high += 0.5; }
     scales[name] = { low, high, stops: (signed ? data.style.signed : data.style.unsigned).map((c) => new THREE.Color(c)) };
-    at("colour").add(new Option(data.label[name], name, name === "omega", name === "omega"));
+    at("colour").add(new Option(data.label[name], name));
   }
+  // at first by the rates, unless all discs are at rest then
+  at("colour").value = runs.some((run) => run.omega.subarray(0, run.n).some((value) => value)) ? "omega" : "theta";
   const mixed = new THREE.Color();
   function colour(scale, value) {
     const p = Math.min(Math.max((value - scale.low) / (scale.high - scale.low), 0), 1) * (scale.stops.length - 1);
@@ -48,23 +52,60 @@
     return;
   }
   renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-  renderer.setClearColor("#fcfcfa");
   renderer.setScissorTest(true);
+  renderer.domElement.setAttribute("aria-hidden", "true");
   stage.prepend(renderer.domElement);
-  const low = [0, 1].map((j) => Math.min(...runs.map((run) => smallest(j ? run.y : run.x, Infinity))) - 2 * R);
-  const high = [0, 1].map((j) => Math.max(...runs.map((run) => largest(j ? run.y : run.x, -Infinity))) + 2 * R);
+  const low = [0, 1].map((j) => Math.min(...runs.map((run) => smallest(j ? run.y : run.x, Infinity))) - 1.1 * R);
+  const high = [0, 1].map((j) => Math.max(...runs.map((run) => largest(j ? run.y : run.x, -Infinity))) + 1.1 * R);
   const middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
   const reach = Math.hypot(high[0] - low[0], high[1] - low[1]) / 2;
-  const camera = new THREE.PerspectiveCamera(30, 1, reach / 100, 40 * reach);
+  const places = runs.flatMap((run) => { // some of the motion, what a view of all of it must show
+    const every = Math.ceil(run.x.length / 300), picked = Array.from(run.x.keys()).filter((p) => p % every === 0);
+    return picked.flatMap((p) => [-1, 1].flatMap((side) => [[side, 0, 0], [0, side, 0], [0, 0, 1 + side]].map(([a, b, c]) => new THREE.Vector3(run.x[p] + a * R, run.y[p] + b * R, c * R))));
+  });
+  const camera = new THREE.PerspectiveCamera(30, 1, reach / 100, 100 * reach);
   camera.up.set(0, 0, 1);
   const orbit = new THREE.OrbitControls(camera, renderer.domElement);
   orbit.maxPolarAngle = Math.PI / 2 - 0.02;
+
+  // ---- panels side by side or, on a tall stage, one above the other: [left, top, width, height] in pixels
+  function panel(j) {
+    const width = stage.clientWidth, height = stage.clientHeight, tall = height > width, count = runs.length;
+    return tall ? [0, j * height / count, width, height / count] : [j * width / count, 0, width / count, height];
+  }
+  function toward(a, e) { return new THREE.Vector3(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)); }
+  // the distance from which all the motion is seen along a direction, the point looked at, and the share of the height it fills
+  function fitted(a, e) {
+    const [, , width, height] = panel(0), back = toward(a, e), right = new THREE.Vector3(-Math.sin(a), Math.cos(a), 0);
+    const up = back.clone().cross(right), v = 0.85 * Math.tan(Math.PI / 12), h = v * width / height; // a margin, for titles
+    const target = new THREE.Vector3(middle[0], middle[1], R);
+    let far = 0, sizes;
+    for (let round = 0; round < 8; round++) {
+      const seen = places.map((c) => c.clone().sub(target)).map((c) => [c.dot(right), c.dot(up), c.dot(back)]);
+      far = Math.max(...seen.map(([x, y, z]) => z + Math.max(Math.abs(x) / h, Math.abs(y) / v)));
+      sizes = [0, 1].map((k) => seen.map((c) => c[k] / (far - c[2])));
+      [right, up].forEach((axis, k) => target.addScaledVector(axis, 0.5 * far * (Math.max(...sizes[k]) + Math.min(...sizes[k]))));
+    }
+    target.addScaledVector(up, 0.1 * far * v); // room for titles
+    const [x, y] = sizes.map((of) => Math.max(...of) - Math.min(...of));
+    return { far, target, back, filled: x * y };
+  }
+  let moved = false; // by the reader: then a new size of the window leaves the direction
   function home() {
-    const width = stage.clientWidth / runs.length, height = stage.clientHeight;
-    const far = reach / Math.tan(Math.PI / 12) * Math.max(0.52, 0.8 * height / width), a = -1.05, e = 0.5;
-    orbit.target.set(middle[0], middle[1], R);
-    camera.position.set(middle[0] + far * Math.cos(e) * Math.cos(a), middle[1] + far * Math.cos(e) * Math.sin(a), R + far * Math.sin(e));
+    const tall = panel(0)[3] > panel(0)[2];
+    const best = (tall ? [[-1.05, 0.5], [-0.5, 0.7], [-0.2, 0.8], [-1.4, 0.9]] : [[-1.05, 0.5]]).map(([a, e]) => fitted(a, e))
+      .reduce((one, other) => (other.filled > one.filled ? other : one));
+    orbit.target.copy(best.target);
+    camera.position.copy(best.target).addScaledVector(best.back, best.far);
     orbit.update();
+    moved = false;
+  }
+  function turn(a, e, near) { // by keys
+    const from = camera.position.clone().sub(orbit.target), far = from.length();
+    const now = [Math.atan2(from.y, from.x) + a, Math.min(Math.max(Math.asin(from.z / far) + e, 0.02), 1.55)];
+    camera.position.copy(orbit.target).addScaledVector(toward(...now), far * near);
+    orbit.update();
+    moved = stale = true;
   }
 
   function bar(length, width, thick, angle) { // from the hub, lying in the disc's plane; the disc's axle is the x axis, z is up
@@ -95,15 +136,16 @@
     scene.add(sun);
     const round = 10 ** Math.floor(Math.log10(reach / 3)), step = [1, 2, 5, 10].map((m) => m * round).find((s) => s >= reach / 6);
     const cells = 2 * Math.ceil(1.5 * reach / step);
-    const grid = new THREE.GridHelper(cells * step, cells, data.style.ground, data.style.ground).rotateX(Math.PI / 2);
+    const grid = new THREE.GridHelper(cells * step, cells).rotateX(Math.PI / 2);
     grid.position.set(Math.round(middle[0] / step) * step, Math.round(middle[1] / step) * step, -0.002 * R);
     scene.add(grid);
+    grid.material.vertexColors = false;
     const dark = new THREE.MeshLambertMaterial({ color: data.style.ink });
     const parts = {
       disc: many(scene, shapes.disc, new THREE.MeshLambertMaterial(), run.n),
       cross: many(scene, shapes.cross, dark, run.n),
       mark: many(scene, shapes.mark, dark, run.n),
-      rod: many(scene, shapes.rod, dark, run.n - 1 + run.ring),
+      rod: many(scene, shapes.rod, new THREE.MeshLambertMaterial(), run.n - 1 + run.ring),
     };
     // tracks: for each step of time one short line a disc, so that the first so many are those up to now
     const F = run.t.length, n = run.n, lines = new Float32Array(6 * n * Math.max(F - 1, 0));
@@ -112,12 +154,21 @@
         for (const g of [f, f + 1]) { lines[p++] = run.x[g * n + i]; lines[p++] = run.y[g * n + i]; lines[p++] = 0.004 * R; }
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(lines, 3));
-    const tracks = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: data.style.grey, transparent: true, opacity: 0.55 }));
+    const tracks = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 }));
     tracks.frustumCulled = false;
     scene.add(tracks);
-    return { run, scene, parts, tracks };
+    return { run, scene, parts, tracks, grid };
   }
   const panels = runs.map(build);
+  function paint() { // in the colours of the light or the dark page
+    renderer.setClearColor(tone("back"));
+    for (const { grid, tracks, parts } of panels) {
+      grid.material.color.set(tone("grid"));
+      tracks.material.color.set(tone("track"));
+      parts.rod.material.color.set(tone("rod"));
+    }
+    stale = true;
+  }
 
   // ---- a frame: linear between the two recorded ones, or the one before where they are too far apart for that
   function place({ t, held }, time) {
@@ -165,22 +216,17 @@
     strip.width = width * ratio; strip.height = height * ratio;
     const pen = strip.getContext("2d");
     pen.scale(ratio, ratio);
-    const up = (value) => height - 8 - (height - 30) * value / top;
-    pen.strokeStyle = "#ccc"; pen.beginPath(); pen.moveTo(edge, up(0)); pen.lineTo(width - edge, up(0)); pen.stroke();
-    pen.font = "13px system-ui, 'DejaVu Sans', sans-serif";
-    let left = edge;
+    const up = (value) => height - 8 - (height - 16) * value / top;
+    pen.strokeStyle = tone("rule"); pen.beginPath(); pen.moveTo(edge, up(0)); pen.lineTo(width - edge, up(0)); pen.stroke();
     runs.forEach((run, j) => {
-      pen.strokeStyle = pen.fillStyle = data.style.runs[j];
+      pen.strokeStyle = tone(kinds[j]);
       pen.lineWidth = 2; pen.setLineDash(j ? [6, 4] : []);
       pen.beginPath();
       run.t.forEach((time, f) => pen.lineTo(across(time), up(run.energy[f])));
       pen.stroke();
-      const text = `${j ? "- -" : "\u2014"} energy ${run.energy[0].toPrecision(5)}, varies by ${run.drift.toExponential(0)}${runs.length > 1 ? ` (${short(run.title)})` : ""}`;
-      pen.fillText(text, left, 14);
-      left += pen.measureText(text).width + 28;
     });
-    pen.setLineDash([]); pen.lineWidth = 1; pen.strokeStyle = data.style.ink;
-    pen.beginPath(); pen.moveTo(across(now), 20); pen.lineTo(across(now), height - 4); pen.stroke();
+    pen.setLineDash([]); pen.lineWidth = 1; pen.strokeStyle = tone("ink");
+    pen.beginPath(); pen.moveTo(across(now), 2); pen.lineTo(across(now), height - 2); pen.stroke();
   }
 
   // ---- time
@@ -201,10 +247,16 @@
   }
 
   function resize() {
-    const width = stage.clientWidth, height = stage.clientHeight;
-    renderer.setSize(width, height, false);
-    camera.aspect = width / runs.length / height;
+    renderer.setSize(stage.clientWidth, stage.clientHeight, false);
+    const [, , width, height] = panel(0);
+    camera.aspect = width / height;
     camera.updateProjectionMatrix();
+    panels.forEach(({ title }, j) => {
+      const [left, top, width] = panel(j);
+      Object.assign(title.style, { left: `${left}px`, top: `${top}px`, width: `${width}px` });
+      if (j) Object.assign(title.style, { borderLeftWidth: left ? "1px" : 0, borderTopWidth: top ? "1px" : 0 });
+    });
+    if (!moved) home();
     stale = true;
   }
 
@@ -234,32 +286,36 @@
     stale = false;
     scrub.value = now;
     at("time").value = `t = ${now.toFixed(2)}`;
-    const width = stage.clientWidth / panels.length, height = stage.clientHeight;
-    panels.forEach((panel, j) => {
-      pose(panel, now);
-      renderer.setViewport(j * width, 0, width, height);
-      renderer.setScissor(j * width, 0, width, height);
-      renderer.render(panel.scene, camera);
+    scrub.setAttribute("aria-valuetext", at("time").value);
+    panels.forEach((each, j) => {
+      pose(each, now);
+      const [left, top, width, height] = panel(j), place = [left, stage.clientHeight - top - height, width, height];
+      renderer.setViewport(...place);
+      renderer.setScissor(...place);
+      renderer.render(each.scene, camera);
     });
     drawEnergy();
   }
 
   runs.forEach((run, j) => {
     const title = document.createElement("div");
-    title.className = "title";
+    panels[j].title = title;
+    title.className = runs.length > 1 ? `title ${kinds[j]}` : "title";
     const name = document.createElement("div"), when = panels[j].when = document.createElement("div");
     name.className = "name";
     name.textContent = run.title;
     when.className = "when";
     title.append(name, when);
-    title.style.left = `${100 * j / runs.length}%`;
-    title.style.width = `${100 / runs.length}%`;
-    if (runs.length > 1) title.style.color = data.style.runs[j];
-    if (j) title.style.borderLeft = "1px solid #ddd";
     stage.append(title);
+    const energy = document.createElement("div"), swatch = document.createElement("span");
+    swatch.className = `swatch ${kinds[j]}`;
+    energy.append(swatch, `energy ${run.energy[0].toPrecision(5)}, varies by ${run.drift.toExponential(0)}${runs.length > 1 ? ` (${short(run.title)})` : ""}`);
+    at("energies").append(energy);
   });
+  at("energy").setAttribute("aria-label", `energy against time: ${at("energies").textContent}`);
+  const thinned = runs.filter((run) => run.frames > run.t.length).map((run) => `${short(run.title)}: ${run.t.length} of its ${run.frames} frames are shown, to keep the page small`);
   const held = runs.filter((run) => run.held).map((run) => `${short(run.title)}: its ${run.t.length} frames are too far apart to draw the motion between them, and are shown one by one; take more frames`);
-  at("note").replaceChildren(...[...held, `radius drawn ${R.toPrecision(3)}`].map((text) => {
+  at("note").replaceChildren(...[...thinned, ...held, `radius drawn ${R.toPrecision(3)}`].map((text) => {
     const line = document.createElement("div");
     line.textContent = text;
     return line;
@@ -272,16 +328,27 @@
   strip.onpointerdown = (event) => { play(false); strip.setPointerCapture(event.pointerId); seek(event); };
   strip.onpointermove = (event) => { if (event.buttons) seek(event); };
   orbit.addEventListener("change", () => { stale = true; });
-  window.addEventListener("resize", resize);
+  orbit.addEventListener("start", () => { moved = true; });
+  new ResizeObserver(resize).observe(stage);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
   document.addEventListener("keydown", (event) => {
-    const keys = { " ": () => play(!playing), ArrowRight: () => step(1), ArrowLeft: () => step(-1), Home: () => go(start), End: () => go(end) };
-    if (!keys[event.key] || event.ctrlKey || event.altKey || event.metaKey || event.target.tagName === "SELECT") return;
+    const turns = { ArrowRight: () => turn(0.1, 0, 1), ArrowLeft: () => turn(-0.1, 0, 1), ArrowUp: () => turn(0, 0.1, 1), ArrowDown: () => turn(0, -0.1, 1) };
+    const zooms = { "+": () => turn(0, 0, 0.9), "-": () => turn(0, 0, 1 / 0.9) };
+    const times = { " ": () => play(!playing), ArrowRight: () => step(1), ArrowLeft: () => step(-1), Home: () => go(start), End: () => go(end) };
+    const keys = { ...times, ...zooms, ...(event.shiftKey || stage.matches(":focus-visible") ? turns : {}) };
+    const takesKeys = ["SELECT", "SUMMARY"].includes(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON");
+    if (!keys[event.key] || event.ctrlKey || event.altKey || event.metaKey || takesKeys) return;
     event.preventDefault();
     keys[event.key]();
   }, true);
+  // one unit of time a second, unless that is a flash or without end: then the motion takes four to ten seconds
+  const size = 10 ** Math.floor(Math.log10((end - start) / 4)), usual = end - start >= 0.9 && end - start <= 40 || end === start;
+  const rate = usual ? 1 : [5, 2, 1].map((m) => m * size).find((m) => (end - start) / m >= 4);
+  for (const m of [0.25, 0.5, 1, 2, 4]) at("speed").add(new Option(Number((m * rate).toPrecision(3)), m * rate, m === 1, m === 1));
   globalThis.discs = { panels, camera, go, play }; // for the console
   resize();
-  home();
   legend();
+  paint();
+  play(end > start && !matchMedia("(prefers-reduced-motion: reduce)").matches);
   requestAnimationFrame(draw);
 })();
