@@ -55,7 +55,7 @@ def compile_for(law: str, size: str, tested: bool) -> None:
         first = methods[0]
         if n == MANY and not (isinstance(first, FixedStep) and first.in_lanes and problem.system.lanes):
             continue
-        in_lanes = n != MANY and not steered and isinstance(first, FixedStep) and first.in_lanes
+        in_lanes = n != MANY and isinstance(first, FixedStep) and first.in_lanes
         if in_lanes and (not tested or (law, first.name) == ("field", "midpoint")):
             simulate_many([problem] * 3, first, 0.005, threads=1, progress=False)
             print(f"{words}, side by side: {', '.join(method.name for method in methods)} compiled", flush=True)

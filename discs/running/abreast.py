@@ -1,4 +1,4 @@
-"""Runs side by side in the lanes of a vector (`discs.kernels.bundle`): eight chains of the same kind, law and number of discs.
+"""Runs side by side in the lanes of a vector (`discs.kernels.bundle`): eight chains of the same kind and number of discs.
 
 Sweeps of a step go on until every chain of a bundle has converged, so trajectories are those of `simulate` to what the tolerance of
 sweeps leaves: some units in the last place by default. Whatever would need a word - steps that do not converge or are long for the
@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discs.arrays import Bool, Float
-from discs.chains import stencils
-from discs.chains.chain import Chain
+from discs.chains.chain import SteeredChain
 from discs.chains.links import LinearCurvature
 from discs.integrators import FixedStep
 from discs.integrators.work import NO_LOOKS
@@ -21,6 +20,7 @@ from discs.kernels.vectors import LANES
 from discs.problem import Problem
 from discs.running.album import all_steps_before
 from discs.running.calls import heed_halt
+from discs.running.cloud import Cloud
 from discs.running.frames import ROUNDING
 from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, estimated
@@ -36,9 +36,11 @@ DIGITS = 0.1  # of the error that rounding leaves in a sweep, as in `discs.runni
 def kind_of(problem: Problem) -> tuple[Any, ...] | None:
     """What chains in a bundle have in common; None for a problem that is not for bundles."""
     chain = problem.chain
-    if problem.loads or not isinstance(chain, Chain) or not LEAST.get(chain.ends, 0) <= chain.n <= MOST:
+    if problem.loads or not LEAST.get(chain.ends, 0) <= chain.n <= MOST or problem.ill_posed:
         return None
-    if chain.link_law is not LinearCurvature or chain.rolling_law.parameters is None or problem.ill_posed:
+    if isinstance(chain, SteeredChain):
+        return (chain.n, chain.ends, "own", problem.duration) if chain.degree == 1 else None
+    if chain.link_law is not LinearCurvature or chain.rolling_law.parameters is None:
         return None
     return chain.n, chain.ends, chain.rolling, problem.duration
 
@@ -77,39 +79,40 @@ def side_by_side(problems: Sequence[Problem], integrator: FixedStep, h: float, t
         return None
     cloud = Cloud(problems)
     padded = np.minimum(np.arange(-(-count // LANES) * LANES), count - 1).reshape(-1, LANES)
-    q, pi, bounds = cloud.q, cloud.momenta, cloud.bounds
-    n, frames = q.shape[2], times.size
+    q, bounds, names = cloud.q, cloud.bounds, cloud.rows
+    n, rows, frames = q.shape[2], q.shape[1], times.size
 
     def laned(values: Float) -> Float:
         """(B, rows, n) as (bundles, rows, n LANES)."""
         return np.ascontiguousarray(values[padded].transpose(0, 2, 3, 1)).reshape(len(padded), values.shape[1], -1)
 
-    hi, momenta, work = laned(q), laned(pi[:, None]), np.zeros((len(padded), 2), int)
-    size, clean, watch = n * LANES, np.zeros(len(padded), bool), Watch(last, 3, n)
+    hi, momenta, work = laned(q), laned(cloud.momenta), np.zeros((len(padded), 2), int)
+    size, clean, watch = n * LANES, np.zeros(len(padded), bool), Watch(last, rows, n)
     if not checked:
         watch.looks = watch.looks[:0]
-    defects = np.zeros((len(padded), watch.looks.size, 2, 3 * LANES))
-    shown, rates = np.empty((len(padded), 3, frames, size)), np.empty((len(padded), 1, frames, size))
+    defects = np.zeros((len(padded), watch.looks.size, 2, rows * LANES))
+    shown, rates = np.empty((len(padded), rows, frames, size)), np.empty((len(padded), rows - 2, frames, size))
     told, lo = np.empty((len(padded), 2 * LANES, frames)), np.zeros_like(hi[0])
     for m, bundle in enumerate(bundles(cloud.parameters, cloud.chains[padded], bounds[padded])):
         stops = steps, rests, shown[m], rates[m], told[m]
         clean[m] = advance(integrator, bundle, Phases(hi[m], lo.copy(), momenta[m]), h, watch, defects[m], stops, work[m])
-    looked = defects.reshape(len(padded), watch.looks.size, 2, 3, LANES)
+    looked = defects.reshape(len(padded), watch.looks.size, 2, rows, LANES)
     errors = np.array([estimated(seen, last) for seen in looked]).ravel()[:count] if checked else np.zeros(count)
 
     def by_chain(values: Float) -> Float:
         """(bundles, F, n LANES) as (B, F, n)."""
-        found: Float = values.reshape(len(padded), frames, n, LANES).transpose(0, 3, 1, 2).reshape(-1, frames, n)[:count]
-        return found
+        each: Float = values.reshape(len(padded), frames, n, LANES).transpose(0, 3, 1, 2).reshape(-1, frames, n)[:count]
+        return each
 
-    rows = {name: by_chain(shown[:, row]) for row, name in enumerate(("x", "y", "theta"))} | {"omega": by_chain(rates[:, 0])}
+    found = {name: by_chain(shown[:, row]) for row, name in enumerate(names)}
+    found |= {name: by_chain(rates[:, row]) for row, name in enumerate(cloud.rates)}
     energies = told.reshape(len(padded), 2, LANES, frames).swapaxes(1, 2).reshape(-1, 2, frames)[:count]
-    rows |= {"energy": energies[:, 0], "rolling_residual": energies[:, 1]}
+    found |= {"energy": energies[:, 0], "rolling_residual": energies[:, 1]}
     fit = np.repeat(clean, LANES)[:count] & (errors <= SUSPECTED[0]) & (1.1e-16 * h * h * cloud.stiffest <= DIGITS)
     if checked:
-        fit &= np.abs(rows["energy"] - cloud.energy[:, None]).max(axis=1) <= DRIFT * bounds / 10
+        fit &= np.abs(found["energy"] - cloud.energy[:, None]).max(axis=1) <= DRIFT * bounds / 10
     gradients, solves = np.repeat(work, LANES, axis=0)[:count].T
-    return Found(fit, rows, errors, solves, gradients, last, clock.perf_counter() - begun)
+    return Found(fit, found, errors, solves, gradients, last, clock.perf_counter() - begun)
 
 
 def advance(
@@ -117,11 +120,11 @@ def advance(
 ) -> bool:
     """Take all steps of a bundle, and its frames; returns whether no step needs a word.
 
-    watch : the steps to be looked at. defects : of each look, (m, 2, 3 LANES), filled in. stops : steps before frames, rests and
+    watch : the steps to be looked at. defects : of each look, (m, 2, rows LANES), filled in. stops : steps before frames, rests and
     arrays of frames, as for compiled steps. work : (2,), gradients and solves, are added.
     """
     size, frames, last = state.hi.shape[1], stops[0].size, int(stops[0][-1])
-    places = np.empty((1, 3, size))
+    places = np.empty((1, len(state.hi), size))
     done, framed, passed, doubted = 0, 0, 0, False
     while done < last or framed < frames:
         heed_halt()
@@ -130,9 +133,9 @@ def advance(
             finer, one = (type(state)(*[part.copy() for part in state]) for _ in range(2))
             integrator.steps(bundle, finer, done * h, 0.5 * h, 2, np.inf)
             integrator.steps(bundle, one, done * h, h, 1, np.inf)
-            compared = [np.abs(value).reshape(3, -1, LANES).max(axis=1).ravel() for value in (finer.hi - one.hi, finer.hi)]
-            longer = defects[passed, 0] > watch.limit * defects[passed, 1]
-            defects[passed] = np.where(longer, compared, defects[passed])
+            compared = [np.abs(value).reshape(len(value), -1, LANES).max(axis=1).ravel() for value in (finer.hi - one.hi, finer.hi)]
+            longer = (defects[passed, 0] > watch.limit * defects[passed, 1]).reshape(-1, LANES).any(axis=0)
+            defects[passed] = np.where(np.tile(longer, len(state.hi)), compared, defects[passed])  # of the chains that are doubted
             passed += 1
         looks = NO_LOOKS if doubted else (done, watch.looks[passed:], places, defects[passed:], watch.limit)
         tally = integrator.steps(bundle, state, done * h, h, several, 1.0, looks, (1, done, framed, *stops))
@@ -143,51 +146,3 @@ def advance(
             return False  # a frame whose step fails
         work += tally.gradients, tally.solves
     return True
-
-
-class Cloud:
-    """Chains of one kind as arrays, by the formulas of `discs.chains.slaved`.
-
-    Attributes
-    ----------
-    parameters : of the chains that differ. chains : (B,), the number of each problem's chain in them.
-    q : (B, 3, n), initial positions. momenta : (B, n). energy : (B,), at the start. bounds : (B,), as `Problem.blown_up`.
-    stiffest : (B,), as in `SlavedSystem`.
-    """
-
-    def __init__(self, problems: Sequence[Problem]) -> None:
-        number: dict[int, int] = {}
-        first: list[Problem] = []
-        for problem in problems:
-            if id(problem.chain) not in number:
-                number[id(problem.chain)] = len(first)
-                first.append(problem)
-        self.chains = np.array([number[id(problem.chain)] for problem in problems])
-        systems, ends = [problem.system for problem in first], first[0].chain.ends
-        self.parameters = [system.parameters for system in systems]
-
-        def each(values: Sequence[Any]) -> Float:
-            found: Float = np.array(values, float)[self.chains]
-            return found
-
-        starts = [problem.initial for problem in problems]
-        self.q = np.array([(start.x, start.y, start.theta) for start in starts])
-        links = stencils.links(self.q, ends)
-        if ends == "ring":
-            links[..., -1] += each([given.shift for given in self.parameters])
-        slope = stencils.slopes(links[:, :2], each([given.k for given in self.parameters])[:, None, None], ends).swapaxes(0, 1)
-        assert isinstance(first[0].chain, Chain)
-        arm = first[0].chain.rolling_law.arm(each([given.radius for given in self.parameters]), slope)
-        weights = each([given.weights for given in self.parameters])
-        inertia = weights[:, 2] + weights[:, 0] * ((slope[1] * arm) ** 2 + (slope[0] * arm) ** 2)
-        self.momenta = np.sqrt(inertia) * np.array([start.omega for start in starts])
-        bends = (stencils.bends(links[:, :2], ends) ** 2).sum(axis=1)
-        torsion = each([given.links.torsion for given in self.parameters])[:, 1 : 1 + links.shape[2]]
-        twice = (each([given.links.bend for given in self.parameters]) * bends).sum(axis=1) + (torsion * links[:, 2] ** 2).sum(
-            axis=1
-        )
-        self.energy = 0.5 * ((self.momenta**2).sum(axis=1) + twice)
-        chains = [problem.chain for problem in first]
-        rounding = [1e-16 * (np.max(c.torsion_stiffness) + np.max(c.bending_stiffness)) / c.length for c in chains]
-        self.bounds = 10 * self.energy + each(rounding)
-        self.stiffest = each([system.stiffest for system in systems])

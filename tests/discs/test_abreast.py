@@ -15,13 +15,14 @@ from discs.kernels.vectors import LANES
 from discs.running import abreast as running
 from discs.running import step_error
 from discs.running.part import Settings, parts_of
-from tests.conftest import SLAVED, Model, longer, models, uneven
+from tests.conftest import SLAVED, STEERED, Model, longer, models, uneven
 from tests.discs.test_kernels import dense_banded
 from tests.discs.test_simulate_many import cloud
 
 pytestmark = pytest.mark.slow  # kernels as plain Python
 
 ROWS = "x", "y", "theta", "omega", "energy"
+OWN = *ROWS, "phi", "phi_rate"
 ONES = "length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius"
 CLOSE = 3e-12  # as of the twins: what an unconverged sweep of a stiff step leaves
 
@@ -30,7 +31,7 @@ def compare(runs, problems, method, dt, times, close=CLOSE):
     """Runs side by side with those of the plain engine."""
     for i, problem in enumerate(problems):
         run = simulate(problem, method, dt, times, (), False, "plain")
-        for name in ROWS:
+        for name in OWN if hasattr(run, "phi") and run.phi is not None else ROWS:
             one, other = getattr(runs, name)[i], getattr(run, name)
             np.testing.assert_allclose(one, other, atol=close * np.abs(other).max(), rtol=0, err_msg=f"{name} of run {i}, {method}")
         assert runs[i].stats["engine"] == "compiled"
@@ -55,7 +56,7 @@ def noted(monkeypatch):
     return counts
 
 
-@models(SLAVED, [SLAVED[0], SLAVED[3], SLAVED[6]])
+@models(SLAVED + STEERED, [SLAVED[0], SLAVED[3], SLAVED[6], *STEERED])
 @pytest.mark.parametrize("name", ["midpoint", "suzuki4", "gauss6", "radau5"])
 def test_side_by_side_is_one_by_one(model, name, kernels_as_python, noted):
     """Ten chains that differ in everything, in two bundles; converged, and after one sweep, where the matrix matters."""
@@ -70,7 +71,7 @@ def test_side_by_side_is_one_by_one(model, name, kernels_as_python, noted):
 
 @pytest.mark.parametrize("n", [3, 4, 5, 6, 8, 17])
 def test_few_discs(n, kernels_as_python, noted):
-    for model in SLAVED:
+    for model in SLAVED + STEERED:
         if n >= {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}[model.ends]:
             problems = cloud(3, n, model)
             runs = simulate_many(problems, "midpoint", 0.002, [0.003, 0.008], progress=False)
@@ -153,6 +154,28 @@ def test_each_run_keeps_its_tolerance(how, kernels_as_python, noted):
         assert 0.8 < alone.stats["dt"] / run.stats["dt"] < 2
 
 
+@pytest.mark.long  # compiles for 20 s
+def test_compiled_own_headings():
+    for model in STEERED:
+        problems = cloud(11, 17, model)
+        runs = simulate_many(problems, "midpoint", 0.01, [0.0, 0.02, 0.035], progress=False)
+        compare(runs, problems, "midpoint", 0.01, [0.0, 0.02, 0.035])
+
+
+def test_a_heading_that_turns_far_in_a_step_is_compared(kernels_as_python, noted):
+    """Whole turns do not show in third differences: a chain that spins has its steps compared, as alone."""
+    problems = cloud(3, 7, STEERED[0])
+    start = problems[1].initial
+    still = replace(start, omega=0 * start.omega, phi_rate=314 + 0 * start.omega)
+    problems[1] = replace(problems[1], initial=still)
+    with pytest.warns(UserWarning, match="1 of 3 runs have warnings, as run 1"):
+        runs = simulate_many(problems, "midpoint", 0.02, [0.3], progress=False)
+    with pytest.warns(UserWarning, match="too long for this motion") as warned:
+        simulate(problems[1], "midpoint", 0.02, [0.3], (), False, "plain")
+    assert runs.warned == {1: [str(one.message) for one in warned]}
+    assert noted == [2]
+
+
 def test_calls_of_few_steps_make_the_same_bits(kernels_as_python, monkeypatch):
     """As `simulate`, whose calls are cut too: frames and looks go on."""
     problems = cloud(8, 9)
@@ -165,11 +188,11 @@ def test_calls_of_few_steps_make_the_same_bits(kernels_as_python, monkeypatch):
 
 
 def test_the_initial_state_is_that_of_a_problem():
-    for model in SLAVED:
+    for model in SLAVED + STEERED:
         problems = cloud(5, 9, model)
         found = running.Cloud([problems[2], *problems])
         for i, problem in enumerate(problems, 1):
-            np.testing.assert_array_equal(found.momenta[i], problem.start().pi)
+            np.testing.assert_allclose(found.momenta[i], np.atleast_2d(problem.start().pi), rtol=4e-16)
             assert found.energy[i] == pytest.approx(problem.energy(), rel=1e-14)
             assert found.bounds[i] == pytest.approx(problem.blown_up, rel=1e-14)
         assert len(found.parameters) == 5
@@ -178,13 +201,16 @@ def test_the_initial_state_is_that_of_a_problem():
 def test_which_runs_go_side_by_side():
     alike = [*cloud(4, 9), *cloud(4, 9, Model("springs", "unit"))]
     true = replace(alike[0], chain=Chain(**dict.fromkeys(ONES, 1.0), n=9, rolling="unit", curvature="true", stretch_stiffness=1.0))
-    others = [uneven(9, Model("ring", "steered")), true, cloud(1, 8)[0], replace(alike[0], duration=2.0)]
+    quadratic = uneven(9, STEERED[0])
+    quadratic = replace(quadratic, chain=replace(quadratic.chain, degree=2))
+    others = [quadratic, true, cloud(1, 8)[0], replace(alike[0], duration=2.0)]
     given = Settings(Midpoint(), 0.1, None, 1, (), "compiled")
 
     def parts(settings, problems):
         return [part.numbers for part in parts_of(problems, settings)]
 
     assert parts(given, [*alike, *others]) == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11]]
+    assert parts(given, [*alike, *cloud(4, 9, STEERED[0])]) == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11]]
     for other in (given._replace(method=METHODS["rk4"]()), given._replace(engine="plain"), given._replace(want=("slope",))):
         assert parts(other, alike) == [list(range(8))]
     assert (
