@@ -43,9 +43,10 @@ def simulate_many(
 
     Each run is what `simulate` makes of its problem, with its own errors and warnings: a run that fails leaves the others alone.
     Chains without loads, with slaved headings and linear curvature or with own headings and links of degree 1, that have the ends,
-    law, number of discs, duration and step in common, run eight at a time in the lanes of a vector, by the midpoint method, its compositions, Gauss and Radau methods, where nothing
-    is in `want`. Their sweeps go on until all eight have converged, and `stats["solves"]` counts these: numbers agree with those of
-    `simulate` to the tolerance of sweeps, by default some units in the last place. All other runs go one by one.
+    law, number of discs, duration and step in common, run eight at a time in the lanes of a vector, by the midpoint method, its
+    compositions, Gauss and Radau methods, where nothing is in `want`. Their sweeps go on until all eight have converged, and
+    `stats["solves"]` counts these: numbers agree with those of `simulate` to the tolerance of sweeps, by default some units in the
+    last place. All other runs go one by one.
 
     Parameters
     ----------
