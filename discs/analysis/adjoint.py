@@ -17,20 +17,24 @@ import numpy as np
 
 from discs import checks
 from discs.analysis.costs import RATES, cost_by_frame
-from discs.analysis.linear import Linearised
-from discs.analysis.parameters import INERTIAS, STIFFNESSES, Springs, basis_by, by_inertia
-from discs.analysis.tangent import tangent
+from discs.analysis.forces import LoadParameter
+from discs.analysis.parameters import INERTIAS, STIFFNESSES, Inertias, Pull, Springs, basis_by
+from discs.analysis.stages import At, equations
+from discs.analysis.steps import Steps
+from discs.analysis.tangent import back, ready
 from discs.arrays import Float
-from discs.integrators import Integrator, Midpoint, Work, find
-from discs.integrators.collocated import Collocated, Common, collocate
-from discs.integrators.tableaux import tableau
+from discs.integrators import Integrator, Midpoint, find
+from discs.integrators.collocated import Collocated
+from discs.kernels.background import usual
 from discs.problem import Problem
 from discs.running.frames import frame_times, steps_before
 from discs.running.progress import NO_BAR, Progress
 from discs.running.suggest import suggest_dt
 from discs.simulation import simulate
 from discs.skew import Phase
+from discs.solution import Solution
 
+FEWEST = 32  # steps between two states that are kept
 INITIAL = ("x", "y", "theta", "phi", "omega", "phi_rate")
 
 
@@ -43,6 +47,7 @@ def gradient(
     frames: Any = 1,
     cost_gradient: Callable[[Any], dict[str, Any]] | None = None,
     progress: bool = True,
+    engine: str | None = None,
 ) -> dict[str, Float]:
     """The derivatives of a cost of the frames of a run with respect to its initial state and its parameters.
 
@@ -53,11 +58,14 @@ def gradient(
         phi_rate), (F, n), written in NumPy. It is differentiated by dual numbers (`discs.analysis.duals`).
     wrt : names: of the initial state, "x", "y", "theta", "omega" ("phi", "phi_rate"), the others held; or of the chain, "radius",
         "density", "spin_inertia", "torsion_stiffness", "bending_stiffness" ("heading_inertia", "stretch_stiffness",
-        "shear_stiffness"), the initial state held.
+        "shear_stiffness"), the initial state held; or of a load and its signal, as "loads[0].pattern", "loads[1].signal.rate",
+        numbers and arrays of loads that are linear in positions and velocities.
     method, dt, frames : as for `simulate`; "midpoint" (where V is quadratic: slaved headings, linear curvature) or a collocation
         method, as "gauss4".
     cost_gradient : instead of dual numbers: run -> the derivatives of the cost, arrays (F, n) by the names of its quantities.
     progress : show a progress bar for more than a second.
+    engine : as for `simulate`. Where headings follow the line, the curvature is linear and loads are, the pass back is compiled
+        too; elsewhere it takes sparse matrices of SciPy.
 
     Returns
     -------
@@ -65,8 +73,8 @@ def gradient(
     (bends,). Where all discs share one number its derivative is the sum. They are the derivatives of the computed cost, not only of
     the exact one, to the tolerance of the sweeps of a step.
 
-    The run is made by `simulate` first, with its warnings and errors: where steps do not converge the gradient is as doubtful. The
-    pass back is on the plain engine; memory grows like the root of the number of steps.
+    The run is made by `simulate` first, with its warnings and errors: where steps do not converge the gradient is as doubtful.
+    Memory grows like the root of the number of steps.
 
     Raises
     ------
@@ -80,15 +88,10 @@ def gradient(
     if h > problem.duration:
         raise ValueError(f"dt must be at most the duration {problem.duration:g}; got {h:g}")
     times = frame_times(frames, problem.duration)
-    places = [steps_before(float(time), h) for time in times]
-    simulate(problem, integrator, h, times[-1:], progress=False, engine="ready")  # which warns of, or stops, what is no motion
-    steps = _Steps(problem, integrator, h)
-    with Progress("gradient", 2 * places[-1][0]) if progress else NO_BAR as bar:
-        told = bar.update if bar else _unseen
-        steps.forward(places[-1][0], told)
-        shown = [steps.after(count, rest) for count, rest in places]
-        seeds = cost_by_frame(problem, times, shown, cost, cost_gradient)
-        return steps.back(places, shown, seeds, names, told)
+    engine = engine or usual()
+    adjoint = _Adjoint(problem, integrator, h, names, ready(problem, integrator, engine))
+    with Progress("gradient", steps_before(float(times[-1]), h)[0]) if progress else NO_BAR as bar:
+        return adjoint.gradient(times, cost, cost_gradient, engine, bar.update if bar else _unseen)
 
 
 def _unseen(step: int) -> None:
@@ -100,7 +103,8 @@ def _names(problem: Problem, wrt: Iterable[str]) -> tuple[str, ...]:
     steered = len(problem.system.rows) == 4
     known = [name for name in (*INITIAL, *INERTIAS, *STIFFNESSES) if name in vars(problem.chain) or name in problem.system.rows]
     known += ["omega", *["phi_rate"] * steered]
-    if not names or any(name not in known for name in names):
+    if not names or any(name not in known and not str(name).startswith("loads[") for name in names):
+        known += ["'loads[0].pattern' and the like"] if problem.loads else []
         raise ValueError(f"wrt must be names among {', '.join(dict.fromkeys(known))}; got {checks.shown(wrt)}")
     return names
 
@@ -117,134 +121,119 @@ def _checked(problem: Problem, method: str | Integrator) -> Integrator:
     raise ValueError(f"gradient takes {need}; got {integrator.name!r}{why}")
 
 
-class _Steps:
-    """The steps of a run, kept at every so manyeth, and their adjoints."""
+class _Adjoint:
+    """The pass back along a run.
 
-    def __init__(self, problem: Problem, integrator: Any, h: float) -> None:
-        self.problem, self.system, self.integrator, self.h = problem, problem.system, integrator, h
-        self.rule = tableau(1) if isinstance(integrator, Midpoint) else integrator.rule
-        self.kept: dict[int, Phase] = {0: problem.start()}
-        self.near: dict[int, Phase] = {}  # those of the last part that was asked for
-        self.stride, self.count = 1, 0
-        self._known: dict[str, Springs] = {}
+    The run is made once and kept at every so manyeth step. From there the steps between are taken again, with their stages.
+    """
 
-    def step(self, z: Phase, number: int, h: float) -> Phase:
-        after: Phase = self.integrator.step(self.system, z, number * self.h, h, Work())
-        return after
+    def __init__(self, problem: Problem, integrator: Any, h: float, names: tuple[str, ...], compiled: bool) -> None:
+        self.problem, self.system, self.integrator, self.h, self.names = problem, problem.system, integrator, h, names
+        self.steps, self.equations = Steps(problem, integrator, compiled), equations(problem)
+        self.inertias, self.of_discs = Inertias(self.equations), [name for name in names if name in INERTIAS]
+        self.springs = {name: Springs(problem, name) for name in names if name in STIFFNESSES}
+        self.of_loads = [LoadParameter(problem, name) for name in names if name.startswith("loads")]
+        self.found = {name: np.zeros(problem.chain.n) for name in self.of_discs}
+        self.stretched: Any = 0.0
 
-    def forward(self, count: int, update: Callable[[int], None]) -> None:
-        """Take `count` steps."""
-        self.stride, self.count, z = max(1, isqrt(count)), count, self.kept[0]
-        for number in range(count):
-            z = self.step(z, number, self.h)
-            if (number + 1) % self.stride == 0:
-                self.kept[number + 1] = z
-            update(number + 1)
-
-    def at(self, number: int) -> Phase:
-        """The state after so many steps, computed again from the last one that was kept."""
-        if number in self.kept:
-            return self.kept[number]
-        if number not in self.near:
-            first = number - number % self.stride
-            self.near, z = {}, self.kept[first]
-            for later in range(first, min(first + self.stride - 1, self.count)):
-                z = self.step(z, later, self.h)
-                self.near[later + 1] = z
-        return self.near[number]
-
-    def after(self, count: int, rest: float) -> Phase:
-        """The state a time `rest` after so many steps."""
-        z = self.at(count)
-        return self.step(z, count, rest) if rest else z
-
-    def stages(self, z: Phase, number: int, h: float) -> list[Linearised]:
-        """The linearised equations at the stages of a step."""
-        t = number * self.h
-        if isinstance(self.integrator, Midpoint):
-            end = self.step(z, number, h)
-            q, pi = 0.5 * (z.hi + z.lo + end.hi + end.lo), 0.5 * (z.pi + end.pi)
-            return [Linearised(self.problem, Phase(q, 0 * q, pi), t + 0.5 * h)]
-        rule = self.rule
-        guide = Common(self.system, z, t, h, rule)
-        _, v, p, _ = collocate(self.system, z, t, h, rule, guide, self.integrator.sweeps, self.integrator.tolerance)
-        q = z.hi + z.lo + h * np.tensordot(rule.a, v, 1)
-        stages = zip(q, p, rule.nodes, strict=True)
-        return [Linearised(self.problem, Phase(at, 0 * at, pi), t + node * h) for at, pi, node in stages]
-
-    def adjoint(self, z: Phase, number: int, h: float, after: Float, found: dict[str, Float]) -> Float:
-        """The derivative before a step from that after it; what parameters do in it is added to `found`."""
-        stages = self.stages(z, number, h)
-        step = tangent(self.rule, h, stages)
-        u = step.stages_back(after)
-        for lin, at in zip(stages, step.rates_back(after, u), strict=True):
-            for name in found:
-                if name in INERTIAS:
-                    found[name] += by_inertia(lin, at, name)
-                elif name in STIFFNESSES:
-                    found[name] += self._springs(name).by_stiffness(lin, at)
-        before: Float = after + u.sum(axis=0)
-        return before
-
-    def _springs(self, name: str) -> "Springs":
-        if name not in self._known:
-            self._known[name] = Springs(self.problem, name)
-        return self._known[name]
-
-    def back(
+    def gradient(
         self,
-        places: list[tuple[int, float]],
-        shown: list[Phase],
-        seeds: list[dict[str, Float]],
-        names: tuple[str, ...],
+        times: Float,
+        cost: Callable[[Any], Any],
+        cost_gradient: Callable[[Any], dict[str, Any]] | None,
+        engine: str,
         update: Callable[[int], None],
     ) -> dict[str, Float]:
-        """The gradient from the derivatives of the cost by the frames, {name: (n,)} for each."""
-        chain, n = self.problem.chain, self.system.n
-        found = {name: np.zeros(n if name in INERTIAS else np.size(getattr(chain, name))) for name in names if name not in INITIAL}
+        """The gradient of a cost of frames at times (F,)."""
+        h, places = self.h, [steps_before(float(time), self.h) for time in times]
         last = places[-1][0]
-        value, waiting = np.zeros(self.kept[0].hi.size + self.kept[0].pi.size), len(places) - 1
-        for number in range(last, -1, -1):
-            while waiting >= 0 and places[waiting][0] == number:
-                rest, z = places[waiting][1], shown[waiting]
-                seed = self._of_frame(z, seeds[waiting], found)
-                value = value + (self.adjoint(self.at(number), number, rest, seed, found) if rest else seed)
-                waiting -= 1
-            if number:
-                value = self.adjoint(self.at(number - 1), number - 1, self.h, value, found)
-                update(2 * last - number + 1)
-        return self._of_start(value, found, names)
+        stride = max(FEWEST, isqrt(last))
+        wanted = {(number, 0.0): number * h for number in [*range(0, last, stride), *(number for number, rest in places if rest)]}
+        wanted |= dict(zip(places, times.tolist(), strict=True))
+        order = {place: i for i, place in enumerate(sorted(wanted))}
+        run = simulate(self.problem, self.integrator, h, [wanted[place] for place in order], progress=False, engine=engine)
+        states = self._states(run)
+        shown = np.array([order[place] for place in places])
+        values = {name: np.asarray(getattr(run, name))[shown] for name in (*self.system.rows, *self.system.rates[2:])}
+        at = self.equations.at(states[0][shown], states[1][shown], times)
+        seeds = self._seeds(at, cost_by_frame(times, values, cost, cost_gradient))
+        due: dict[int, Float] = {}
+        for (number, rest), seed in zip(places, seeds, strict=True):
+            if rest:
+                seed = self._back(self._start(states, order[number, 0.0]), number, number + 1, rest, seed, {})
+            due[number] = due.get(number, 0.0) + seed
+        value = np.zeros_like(seeds[0])
+        for first in reversed(range(0, last, stride)):
+            end = min(first + stride, last)
+            after = {number - first - 1: seed for number, seed in due.items() if first < number <= end}
+            value = self._back(self._start(states, order[first, 0.0]), first, end, h, value, after)
+            update(last - first)
+        return self._of_start(value + due.get(0, 0.0))
 
-    def _of_frame(self, z: Phase, seed: dict[str, Float], found: dict[str, Float]) -> Float:
-        """The derivative of the cost by the state of a frame: omega = C_theta pi."""
-        lin = Linearised(self.problem, z)
-        q, pi = np.zeros_like(z.hi), np.zeros((len(lin.basis) - 2, self.system.n))
-        momenta = np.atleast_2d(z.pi)
-        for name, given in seed.items():
+    def _states(self, run: Solution) -> tuple[Float, Float]:
+        """Positions (F, rows, n) and momenta (F, columns, n) of the frames of a run."""
+        q = np.stack([getattr(run, name) for name in self.system.rows], axis=1)
+        rates = np.stack([getattr(run, name) for name in self.system.rates[2:]], axis=1)
+        momenta = (self.system.momentum(self.system.shape(of), rate) for of, rate in zip(q, rates, strict=True))
+        return q, np.array([np.atleast_2d(pi) for pi in momenta])
+
+    def _start(self, states: tuple[Float, Float], frame: int) -> Phase:
+        q, pi = states[0][frame], states[1][frame]
+        return Phase(q, np.zeros_like(q), pi.reshape(self.problem.start().pi.shape))
+
+    def _back(self, z: Phase, first: int, end: int, h: float, value: Float, seeds: dict[int, Float]) -> Float:
+        """The value before the steps `first` to `end` of size h from a state; what parameters do in them is added up."""
+        rule, t = self.steps.rule, first * self.h
+        taken = self.steps.take(z, t, h, end - first)
+        stages = end - first, rule.b.size
+        times = t + h * np.add.outer(np.arange(stages[0]), rule.nodes).ravel()
+        at = self.equations.at(taken.q.reshape(-1, *taken.q.shape[2:]), taken.pi.reshape(-1, *taken.pi.shape[2:]), times)
+        value, m = back(rule, h, self.equations, at, value, self.steps.compiled, seeds)
+        if self.of_discs or self.springs or self.of_loads:
+            pull = Pull.of(at, m)
+            for name, part in self.inertias(at, pull, self.of_discs).items():
+                self.found[name] += part
+            if self.springs:
+                self.stretched = self.stretched + self.equations.stretched(at, pull.w)
+            for load in self.of_loads:
+                load.add(at, pull)
+        return value
+
+    def _seeds(self, at: At, slopes: list[dict[str, Float]]) -> Float:
+        """The derivatives of the cost by the states of frames, (F, size): omega = C_theta pi."""
+        q, pi = np.zeros_like(at.q), np.zeros_like(at.pi)
+        by_disc = {name: basis_by(self.problem, at.c, at.arm, name) for name in self.of_discs}
+        for name in slopes[0]:
+            given = np.array([slope[name] for slope in slopes])
             if name not in RATES:
-                q[self.system.rows.index(name)] += given
+                q[:, self.system.rows.index(name)] += given
                 continue
             row = RATES[name]
-            pi[row - 2] += given * lin.basis[row]
-            for turn in self.system.turns(lin.shape):
-                q[turn.row] += turn.heading.T @ (given * momenta[row - 2] * turn.basis[row])
-            for inertia in found.keys() & set(INERTIAS):
-                found[inertia] += given * momenta[row - 2] * basis_by(lin, inertia)[row]
-        return np.concatenate([q.ravel(), pi.ravel()])
+            pi[:, row - 2] += given * at.c[:, row]
+            for i, (into, heading) in enumerate(self.equations.headings):
+                q[:, into] += (heading.T @ (given * at.turned[:, i, row]).T).T
+            for inertia, change in by_disc.items():
+                self.found[inertia] += (given * at.pi[:, row - 2] * change[:, row]).sum(axis=0)
+        return np.concatenate([q.reshape(len(q), -1), pi.reshape(len(q), -1)], axis=1)
 
-    def _of_start(self, value: Float, found: dict[str, Float], names: tuple[str, ...]) -> dict[str, Float]:
+    def _of_start(self, value: Float) -> dict[str, Float]:
         """The gradient by the initial state, whose momenta are omega/C_theta, and in the shapes of the parameters."""
-        problem, lin = self.problem, Linearised(self.problem, self.kept[0])
-        q = value[: lin.basis.size].reshape(lin.basis.shape).copy()
-        pi = value[lin.basis.size :].reshape(-1, self.system.n)
+        problem, z = self.problem, self.problem.start()
+        # C and dC/dh at the start: those of momenta 1
+        at = self.equations.at(z.hi[None], np.ones((1, *np.atleast_2d(z.pi).shape)), np.zeros(1))
+        c, turned = at.c[0], at.turned[0]
+        q = value[: z.hi.size].reshape(z.hi.shape).copy()
+        pi = value[z.hi.size :].reshape(-1, self.system.n)
         given = {"omega": np.asarray(problem.initial.omega), "phi_rate": np.asarray(problem.initial.phi_rate)}
         rates = {}
         for name, row in list(RATES.items())[: len(pi)]:
-            rates[name] = pi[row - 2] / lin.basis[row]
-            shrink = -rates[name] * given[name] / lin.basis[row]
-            for turn in self.system.turns(lin.shape):
-                q[turn.row] += turn.heading.T @ (shrink * turn.basis[row])
-            for inertia in found.keys() & set(INERTIAS):
-                found[inertia] += shrink * basis_by(lin, inertia)[row]
-        at_start = dict(zip(self.system.rows, q, strict=True)) | rates
-        return {name: at_start[name] if name in INITIAL else found[name] for name in names}
+            rates[name] = pi[row - 2] / c[row]
+            shrink = -rates[name] * given[name] / c[row]
+            for i, (into, heading) in enumerate(self.equations.headings):
+                q[into] += heading.T @ (shrink * turned[i, row])
+            for inertia in self.of_discs:
+                self.found[inertia] += shrink * basis_by(problem, at.c, at.arm, inertia)[0, row]
+        found = dict(zip(self.system.rows, q, strict=True)) | rates | self.found
+        found |= {name: springs.by_stiffness(self.stretched) for name, springs in self.springs.items()}
+        found |= {load.name: load.total() for load in self.of_loads}
+        return {name: found[name] for name in self.names}

@@ -10,24 +10,17 @@ import scipy
 from discs import checks
 from discs.analysis.duals import Dual
 from discs.arrays import Float
-from discs.problem import Problem
-from discs.skew import Phase
 
 RATES = {"omega": 2, "phi_rate": 3}  # and their rows of C
 
 
 def cost_by_frame(
-    problem: Problem,
     times: Float,
-    shown: list[Phase],
+    values: dict[str, Float],
     cost: Callable[[Any], Any],
     cost_gradient: Callable[[Any], dict[str, Any]] | None,
 ) -> list[dict[str, Float]]:
-    """The derivatives of the cost by the quantities of each frame."""
-    system = problem.system
-    values = {row: np.array([z.hi[i] + z.lo[i] for z in shown]) for i, row in enumerate(system.rows)}
-    velocity = [system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi) for z in shown]
-    values |= {name: np.array([v[row] for v in velocity]) for name, row in RATES.items() if row < len(system.rows)}
+    """The derivatives of the cost by the quantities of each frame, whose values at `times` (F,) are (F, n)."""
     if cost_gradient is not None:
         given = cost_gradient(SimpleNamespace(t=times, **values))
         if not isinstance(given, dict) or not given.keys() <= values.keys():

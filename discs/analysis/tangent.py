@@ -10,7 +10,9 @@ T dy and T^T w take O(n). One stage is the midpoint rule; `midpoint` steps are t
 quadratic (otherwise they take a mean force that keeps the energy).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,16 +20,20 @@ import scipy  # its parts, slow to import, when they are used
 
 from discs import checks
 from discs.analysis.linear import Linearised
+from discs.analysis.stages import At, ConstantEquations, Equations, equations
 from discs.analysis.steady import Steady
+from discs.analysis.steps import Steps
 from discs.arrays import Float, Matrix
-from discs.integrators.tableaux import Tableau, tableau
+from discs.integrators import find
+from discs.integrators.tableaux import Tableau
+from discs.kernels.background import missing, usual
 from discs.problem import Problem
+from discs.running.engine import plain_because
 from discs.running.failure import SimulationError
 from discs.skew import Phase
 
-STAGES = {"midpoint": 1, "gauss4": 2, "gauss6": 3, "gauss8": 4}
-SWEEPS = 60
-TOLERANCE = 1e-13  # of a step's stages, relative
+METHODS = ("midpoint", "gauss4", "gauss6", "gauss8")
+TOLERANCE = 1e-13  # of sweeps, relative
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +75,7 @@ class Tangent:
         return found
 
 
-def tangent(table: Tableau, h: float, stages: list[Linearised]) -> Tangent:
+def tangent(table: Tableau, h: float, stages: Sequence[Linearised]) -> Tangent:
     """The tangent of a step with these equations at its stages."""
     matrices = [lin.matrix for lin in stages]
     blocks = [[-h * weight * matrix for weight, matrix in zip(row, matrices, strict=True)] for row in table.a]
@@ -78,26 +84,136 @@ def tangent(table: Tableau, h: float, stages: list[Linearised]) -> Tangent:
     return Tangent(table, h, matrices, factors)
 
 
-class Flow:
-    """Steps of a Gauss method with their tangents, on the plain engine.
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """The same by compiled sweeps; by the sparse matrix where these do not converge."""
+
+    table: Tableau
+    h: float
+    equations: ConstantEquations
+    at: At
+
+    @cached_property
+    def _sparse(self) -> Tangent:
+        return tangent(self.table, self.h, self.equations.each(self.at.q, self.at.pi, self.at.t))
+
+    @cached_property
+    def _given(self) -> Any:
+        return self.equations.compiled(self.at)
+
+    def forward(self, dy: Float) -> Float:
+        """T dy, for dy (size,) or (size, m)."""
+        from discs.kernels.tangent import forward  # numba is slow to import
+
+        columns, s = dy.reshape(len(dy), -1).T, self.table.b.size
+        found = []
+        for column in columns:
+            right = np.array([column] * s)
+            y = right.copy()
+            if forward(self.table, self._given, self.equations.order, self.h, TOLERANCE, right, y) < 0:
+                return self._sparse.forward(dy)
+            found.append(column + self.table.last @ (y - column))
+        return np.array(found).T.reshape(dy.shape)
+
+    def back(self, w: Float) -> Float:
+        """T^T w, for w (size,) or (size, m)."""
+        found = [back(self.table, self.h, self.equations, self.at, column, True)[0] for column in w.reshape(len(w), -1).T]
+        return np.array(found).T.reshape(w.shape)
+
+
+def back(
+    table: Tableau, h: float, equations: Equations, at: At, value: Float, compiled: bool, seeds: dict[int, Float] | None = None
+) -> tuple[Float, Float]:
+    """A derivative by the state, (size,), taken back from the end of some steps to their start, and M of their stages.
 
     Parameters
     ----------
-    problem : the chain and its loads. method : "midpoint" (for the linear curvature), "gauss4", "gauss6" or "gauss8".
+    at : the stages of the steps, one step after the other. seeds : what is added to the value before it is taken back through the
+        step of that number.
+
+    Returns
+    -------
+    (size,), and (stages, size): what changes of the rates of the stages would add to the cost.
+    """
+    s, value, seeds = table.b.size, value.copy(), seeds or {}
+    steps = len(at.q) // s
+    multipliers = np.empty((steps, s, value.size))
+    compiled = compiled and isinstance(equations, ConstantEquations)
+    if compiled:
+        from discs.kernels.tangent import back as sweep  # numba is slow to import
+
+        given, order = equations.compiled(at), equations.order  # type: ignore[attr-defined]
+        rows, index = np.array([*seeds.values()]).reshape(-1, value.size), np.full(steps, -1)
+        index[list(seeds)] = np.arange(len(seeds))
+    last = steps
+    while last:
+        if compiled:
+            done = sweep(table, given, order, h, TOLERANCE, rows, index[:last], value, multipliers[:last])
+            if done < 0:
+                raise KeyboardInterrupt
+            last -= done
+            if not last:
+                break
+        elif last - 1 in seeds:
+            value += seeds[last - 1]
+        part = slice((last - 1) * s, last * s)
+        one = tangent(table, h, equations.each(at.q[part], at.pi[part], at.t[part]))
+        u = one.stages_back(value)
+        multipliers[last - 1], value = one.rates_back(value, u), value + u.sum(axis=0)
+        last -= 1
+    return value, multipliers.reshape(steps * s, -1)
+
+
+def ready(problem: Problem, integrator: Any, engine: str | None = None) -> bool:
+    """Whether the kernels of steps and tangents are there; with the engine "compiled" they are, as it waits.
+
+    engine : as for `simulate`; None for the usual one.
+    """
+    engine = engine or usual()
+    if plain_because(problem, integrator, engine, ()):
+        return False
+    if engine != "compiled":
+        return not missing(prepare, problem, integrator, compiles=engine == "auto")
+    prepare(problem, integrator)
+    return True
+
+
+def prepare(problem: Problem, integrator: Any) -> None:
+    """Call the kernels of steps and tangents once, which compiles them or reads them from disc."""
+    steps, found, z = Steps(problem, integrator, True), equations(problem), problem.start()
+    steps.take(z, 0.0, 1.0, 0)
+    if isinstance(found, ConstantEquations):
+        from discs.kernels import tangent as kernels  # numba is slow to import
+
+        rule, s = steps.rule, steps.rule.b.size
+        given = found.compiled(found.at(np.array([z.hi] * s), np.array([np.atleast_2d(z.pi)] * s), np.zeros(s)))
+        y = np.zeros((s, z.hi.size + z.pi.size))
+        kernels.back(rule, given, found.order, 1.0, 0.0, y, np.zeros(0, int), y[0], np.zeros((0, *y.shape)))
+        kernels.forward(rule, given, found.order, 1.0, np.inf, y, y.copy())
+
+
+class Flow:
+    """Steps of a Gauss method with their tangents.
+
+    Parameters
+    ----------
+    problem : the chain and its loads. method : "midpoint" (where V is quadratic), "gauss4", "gauss6" or "gauss8".
+    engine : as for `simulate`; None for the usual one.
 
     The unknowns y (size,) are those of `Linearised`: q, then the momenta that no motor prescribes.
     """
 
-    def __init__(self, problem: Problem, method: str = "gauss4") -> None:
-        stages = STAGES[checks.choice("method (with tangents)", method, STAGES)]
-        if stages == 1 and not problem.system.quadratic:
+    def __init__(self, problem: Problem, method: str = "gauss4", engine: str | None = None) -> None:
+        integrator: Any = find(checks.choice("method (with tangents)", method, METHODS))
+        if method == "midpoint" and not problem.system.quadratic:
             raise ValueError(
                 "tangents of midpoint steps need a quadratic potential, as that of the linear curvature; take 'gauss4'"
             )
-        self.problem, self.table = problem, tableau(stages)
+        self.problem = problem
+        self._steps = Steps(problem, integrator, ready(problem, integrator, engine))
+        self._equations = equations(problem)
         self._first = Linearised(problem, problem.start())
         self.start = self._first.join(self._first.z.hi, self._first.z.pi)
-        self._last: Tangent | None = None
 
     def at(self, y: Float, t: float) -> Linearised:
         """The linearised equations at a state and time; driven discs turn at the rates of their motors."""
@@ -111,37 +227,17 @@ class Flow:
                 pi[(axle.row - 2) * system.n + axle.disc] = rate / roots[axle.row - 2, axle.disc]
         return Linearised(self.problem, Phase(q, np.zeros_like(q), pi.reshape(lin.z.pi.shape)), t)
 
-    def step(self, y: Float, t: float, h: float) -> tuple[Float, Tangent]:
+    def step(self, y: Float, t: float, h: float) -> tuple[Float, Tangent | Swept]:
         """The state after a step from t to t + h, and the tangent of the step. SimulationError if its equations are not solved."""
-        table, s, times = self.table, self.table.b.size, t + h * self.table.nodes
-        now = self._last
-        if now is None or now.h != h:
-            now = self._tangent([self.at(y, t)] * s, h)
-        stages = np.concatenate([y + c * h * self.at(y, t).rate for c in table.nodes])
-        scale, before = np.max(np.abs(y)), np.inf
-        for _ in range(SWEEPS):
-            rates = np.array([self.at(part, time).rate for part, time in zip(stages.reshape(s, -1), times, strict=True)])
-            off = (np.tile(y, s).reshape(s, -1) + h * table.a @ rates).ravel() - stages
-            change = now.factors.solve(off)
-            stages = stages + change
-            moved = float(np.abs(change).max())
-            if moved <= TOLERANCE * scale or not np.isfinite(moved):
-                break
-            if moved > 0.3 * before:
-                now = self._tangent([self.at(part, time) for part, time in zip(stages.reshape(s, -1), times, strict=True)], h)
-            before = moved
-        if not moved <= 1e3 * TOLERANCE * scale:
-            disc = int(np.argmax(np.abs(change))) % self.problem.chain.n
-            raise SimulationError(
-                "a step did not converge: it is too long for this motion; take a smaller dt", round(t / h), t, disc
-            )
-        here = [self.at(part, time) for part, time in zip(stages.reshape(s, -1), times, strict=True)]
-        self._last = now = self._tangent(here, h)
-        after: Float = y + h * table.b @ np.array([lin.rate for lin in here])
-        return after, now
-
-    def _tangent(self, stages: list[Linearised], h: float) -> Tangent:
-        return tangent(self.table, h, stages)
+        table, lin = self._steps.rule, self._first
+        after, q, pi, stuck = self._steps.take(self.at(y, t).z, t, h, 1)
+        if stuck or not np.isfinite(after.pi).all():
+            raise SimulationError("a step did not converge: it is too long for this motion; take a smaller dt", round(t / h), t, 0)
+        times = t + h * table.nodes
+        end = lin.join(after.hi + after.lo, after.pi)
+        if self._steps.compiled and lin.free.all() and isinstance(self._equations, ConstantEquations):
+            return end, Swept(table, h, self._equations, self._equations.at(q[0], pi[0], times))
+        return end, tangent(table, h, self._equations.each(q[0], pi[0], times))
 
 
 def units(flow: Flow) -> Float:

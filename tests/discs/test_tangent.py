@@ -8,7 +8,7 @@ import pytest
 from discs import Chain, Problem, SimulationError, State, simulate
 from discs.__main__ import main
 from discs.analysis import lyapunov, modes
-from discs.analysis.tangent import STAGES, Flow
+from discs.analysis.tangent import METHODS, Flow
 from discs.chains.twist import untwisting_chain
 from discs.differences import slope
 from discs.loads import Damping, Motor, Rest, Torque, signals
@@ -47,7 +47,7 @@ def test_tangent_is_the_derivative_of_the_step(model, method):
     assert w @ tangent.forward(v) == pytest.approx(tangent.back(w) @ v, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", STAGES)
+@pytest.mark.parametrize("method", METHODS)
 def test_steps_are_those_of_the_integrators(method):
     problem = replace(
         uneven(7, Model("springs", "field")), duration=0.5, loads=(Damping(rolling=0.3), Torque(0.2, signals.ramp(0.0, 0.5)))

@@ -1,0 +1,212 @@
+"""The linearised equations at many states at once, the stages of steps and frames; `discs.analysis.linear` has them one by one.
+
+`Equations` are those of any problem. `ConstantEquations` are computed by array operations for all states together, where the second
+derivatives are constant: slaved headings, linear curvature, linear loads. They have a compiled form, `discs.kernels.tangent`.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy  # its parts, slow to import, when they are used
+
+from discs.analysis.linear import Linearised
+from discs.arrays import Float, Int, Matrix
+from discs.chains import stencils
+from discs.chains.chain import Chain
+from discs.loads.linear import Linear
+from discs.problem import Problem
+from discs.skew import Phase
+
+
+class At(NamedTuple):
+    """What a chain does at M states.
+
+    t : (M,). q, c, velocity, unbalanced : positions, C, C pi and g = grad V - f, (M, rows, n). pi : (M, columns, n).
+    arm : contact directions of discs of radius 1, (M, 2, n). turned : (M, headings, rows, n), dC/dh pi for each heading h that C
+    depends on. pull : (M, headings, columns, n), dC/dh . g; only of `ConstantEquations`. each : of `Equations`, one by one.
+    """
+
+    t: Float
+    q: Float
+    pi: Float
+    c: Float
+    arm: Float
+    velocity: Float
+    unbalanced: Float
+    turned: Float
+    pull: Float
+    each: tuple[Linearised, ...] = ()
+
+
+class Equations:
+    """The linearised equations of a problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.system, self.chain = problem, problem.system, problem.chain
+
+    def at(self, q: Float, pi: Float, t: Float) -> At:
+        """At positions q (M, rows, n), momenta pi (M, columns, n) and times t (M,)."""
+        each = self.each(q, pi, t)
+        unit = replace(self.problem, chain=replace(self.chain, radius=1.0), loads=()).system
+        arm = [unit.contact(lin.shape) for lin in each]
+        column = np.arange(q.shape[1]) // 3
+        turned = [[turn.basis * p[column] for turn in self.system.turns(lin.shape)] for lin, p in zip(each, pi, strict=True)]
+        parts = ([getattr(lin, name) for lin in each] for name in ("basis", "velocity", "unbalanced"))
+        c, velocity, unbalanced = (np.array(part) for part in parts)
+        return At(t, q, pi, c, np.array(arm), velocity, unbalanced, np.array(turned), np.empty(0), each)
+
+    def each(self, q: Float, pi: Float, t: Float) -> tuple[Linearised, ...]:
+        """One by one."""
+        start = self.problem.start().pi.shape
+        states = (Phase(place, np.zeros_like(place), p.reshape(start)) for place, p in zip(q, pi, strict=True))
+        return tuple(Linearised(self.problem, z, time) for z, time in zip(states, t.tolist(), strict=True))
+
+    @cached_property
+    def headings(self) -> list[tuple[int, Matrix]]:
+        """The row of q and the stencil of each heading."""
+        return [(turn.row, turn.heading) for turn in self.system.turns(Linearised(self.problem, self.problem.start()).shape)]
+
+    def dragged(self, at: At, w: Float) -> Float:
+        """f_v^T w for w (M, rows, n)."""
+        if self.system.load is None:
+            return np.zeros_like(w)
+        drags = (self.system.load.derivatives(*each)[1] for each in zip(at.t.tolist(), at.q, at.velocity, strict=True))
+        return np.array([(drag.T @ part.ravel()).reshape(part.shape) for drag, part in zip(drags, w, strict=True)])
+
+    def stretched(self, at: At, w: Float) -> Float:
+        """The sum over the states of s (B w), (springs,), for strains s and w (M, rows, n)."""
+        parts = zip(at.each, w, strict=True)
+        found: Float = sum(lin.strains.strain * (lin.strains.matrix @ part.ravel()) for lin, part in parts)
+        return found
+
+
+class ConstantEquations(Equations):
+    """Those whose S = grad^2 V - f_q and D = -f_v do not depend on the state; see `equations`."""
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
+        self._springs: Any = problem.chain.link_law(problem.chain)  # type: ignore[union-attr, arg-type]
+
+    def at(self, q: Float, pi: Float, t: Float) -> At:
+        chain, law = self.chain, self.chain.rolling_law  # type: ignore[union-attr]
+        mass, spin, radius = self.system.weights[0], self.system.weights[2], np.asarray(chain.radius)
+        links = self._links(q)
+        z = np.moveaxis(stencils.slopes(links[:, :2], chain.k, chain.ends), 1, 0)
+        arm = np.array([-z[1], z[0]]) * law.arm(1.0, z)
+        e = radius * arm
+        c2 = 1 / np.sqrt(spin + mass * (e * e).sum(axis=0))
+        c = np.stack([e[0] * c2, e[1] * c2, c2], axis=1)
+        velocity, g = c * pi, self._gradient(links)
+        if self.system.load is not None:
+            g -= np.array([self.system.load.applied(*each) for each in zip(t.tolist(), q, velocity, strict=True)])
+        turned, pull = np.empty((len(q), 2, 3, chain.n)), np.empty((len(q), 2, 1, chain.n))
+        for row in (0, 1):
+            along = np.zeros_like(z)
+            along[row] = 1.0
+            turn = radius * law.rate(z, along)
+            de = np.array([-turn[1], turn[0]])
+            shrink = -mass * (e * de).sum(axis=0) * c2**3
+            basis = np.stack([de[0] * c2 + e[0] * shrink, de[1] * c2 + e[1] * shrink, shrink], axis=1)
+            turned[:, row], pull[:, row, 0] = basis * pi, (basis * g).sum(axis=1)
+        return At(t, q, pi, c, np.moveaxis(arm, 0, 1), velocity, g, turned, pull)
+
+    def _links(self, q: Float) -> Float:
+        """Links, (M, 3, n_links)."""
+        links = stencils.links(q, self.chain.ends)
+        if self.chain.ends == "ring":
+            links[:, :2, -1] += self.chain.shift
+        return links
+
+    def _gradient(self, links: Float) -> Float:
+        """grad V, (M, 3, n)."""
+        ends, tension = self.chain.ends, np.empty_like(links)
+        moments = self._springs.bend * stencils.bends(links[:, :2], ends)
+        tension[:, :2] = stencils.gathered(stencils.pull(moments, "springs"), ends)
+        tension[:, 2] = self._springs.twist * links[:, 2]
+        return stencils.pull(tension, ends)
+
+    def dragged(self, at: At, w: Float) -> Float:
+        return -(self.drag.T @ w.reshape(len(w), -1).T).T.reshape(w.shape)  # type: ignore[no-any-return]
+
+    def stretched(self, at: At, w: Float) -> Float:
+        links = self._links(at.q)
+        bends = stencils.bends(links[:, :2], self.chain.ends)
+        strain = np.concatenate([bends[:, 0], bends[:, 1], links[:, 2]], axis=1)
+        change = self._strains.matrix @ w.reshape(len(w), -1).T
+        return (strain * change.T).sum(axis=0)  # type: ignore[no-any-return]
+
+    @cached_property
+    def _strains(self) -> Any:
+        return self.system.strains(self.system.shape(self.problem.start().hi))
+
+    @cached_property
+    def stiff(self) -> Matrix:
+        """S, sparse (3 n, 3 n)."""
+        bending, torsion = self._springs.hessians()
+        whole = scipy.sparse.block_diag([bending, bending, torsion], format="csr")
+        return whole if self.system.load is None else (whole - self._of_load[0]).tocsr()
+
+    @cached_property
+    def drag(self) -> Matrix:
+        """D, sparse (3 n, 3 n)."""
+        n = self.chain.n
+        found = scipy.sparse.csr_array((3 * n, 3 * n)) if self.system.load is None else (-self._of_load[1]).tocsr()
+        found.eliminate_zeros()
+        return found
+
+    @cached_property
+    def _of_load(self) -> tuple[Matrix, Matrix]:
+        q = self.problem.start().hi
+        assert self.system.load is not None
+        return self.system.load.derivatives(0.0, q, np.zeros_like(q))
+
+    @cached_property
+    def order(self) -> Any:
+        """The order of the momenta, `discs.kernels.tangent.Order`."""
+        from discs.kernels.tangent import Order  # numba is slow to import
+
+        n, order = self.chain.n, self.system.order
+        place = np.arange(n) if order is None else np.argsort(order)
+        stiff, drag = _bands(self.stiff, place), _bands(self.drag, place)
+        return Order(place, int(max(stiff.apart.max(initial=0), drag.apart.max(initial=0))), stiff, drag)
+
+    @cached_property
+    def _parts(self) -> tuple[Any, ...]:
+        _, heading = self.headings[0]
+        return _sparse(heading), np.array([row for row, _ in self.headings]), _sparse(self.stiff), _sparse(self.drag)
+
+    def compiled(self, at: At) -> Any:
+        """`discs.kernels.tangent.Stages`."""
+        from discs.kernels.tangent import Stages  # numba is slow to import
+
+        return Stages(at.c, at.turned, at.pull, *self._parts)
+
+
+def equations(problem: Problem) -> Equations:
+    """The linearised equations of a problem at many states."""
+    load, chain = problem.system.load, problem.chain
+    constant = isinstance(chain, Chain) and problem.system.quadratic
+    if constant and load is not None:
+        constant = isinstance(load, Linear) and load.section is None
+    if constant and isinstance(load, Linear) and load.bends is not None:
+        constant = not (load.bends.viscosity.any() or any(drive.curvature is not None for drive in load.drives))
+    return ConstantEquations(problem) if constant else Equations(problem)
+
+
+def _sparse(matrix: Matrix) -> Any:
+    from discs.kernels.tangent import Sparse  # numba is slow to import
+
+    return Sparse(matrix.data[None].astype(float), matrix.indices.astype(np.intp), matrix.indptr.astype(np.intp))
+
+
+def _bands(matrix: Matrix, place: Int) -> Any:
+    """Where the lower half of C^T (matrix) C goes in bands, for a single column of momenta."""
+    from discs.kernels.tangent import Bands  # numba is slow to import
+
+    n = place.size
+    one, two = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr)), matrix.indices.astype(np.intp)
+    low, high = place[one % n], place[two % n]
+    kept = np.flatnonzero(low >= high)
+    return Bands(kept, one[kept], two[kept], low[kept], (low - high)[kept])
