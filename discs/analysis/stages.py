@@ -181,7 +181,7 @@ class ConstantEquations(Equations):
         """`discs.kernels.tangent.Stages`."""
         from discs.kernels.tangent import Stages  # numba is slow to import
 
-        return Stages(at.c, at.turned, at.pull, *self._parts)
+        return Stages(at.c, at.c.reshape(len(at.c), -1), at.turned, at.pull, *self._parts)
 
 
 def equations(problem: Problem) -> Equations:

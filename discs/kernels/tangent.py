@@ -35,11 +35,13 @@ class Sparse(NamedTuple):
 class Stages(NamedTuple):
     """The linearised equations at M stages, the stages of a step next to each other; `discs.analysis.stages` makes them.
 
-    c : (M, rows, n). turned : (M, headings, rows, n), dC/dh pi. pull : (M, headings, columns, n), dC/dh . g. heading : h = heading
-    q of the rows `row`, (headings,). stiff, drag : S and D, of q row after row; drag without entries for none.
+    c : (M, rows, n), and flat, the same as (M, rows n). turned : (M, headings, rows, n), dC/dh pi. pull : (M, headings, columns, n),
+    dC/dh . g. heading : h = heading q of the rows `row`, (headings,). stiff, drag : S and D, of q row after row; drag without
+    entries for none.
     """
 
     c: NDArray
+    flat: NDArray
     turned: NDArray
     pull: NDArray
     heading: Sparse
@@ -71,14 +73,14 @@ class Order(NamedTuple):
 
 
 @part
-def times(a, k, x, factor, to):
-    """to += factor A x."""
+def times(a, k, x, factor, to, anew):
+    """to += factor A x; `anew`, to = factor A x."""
     data = a.data[min(k, a.data.shape[0] - 1)]
     for i in range(a.indptr.size - 1):
         total = 0.0
         for j in range(a.indptr[i], a.indptr[i + 1]):
             total += data[j] * x[a.indices[j]]
-        to[i] += factor * total
+        to[i] = factor * total if anew else to[i] + factor * total
 
 
 @part
@@ -95,10 +97,8 @@ def across(a, k, x, factor, to):
 def assemble(given, bands, k, c, factor, matrix):
     """matrix += factor C^T A C, in bands (unknowns, width + 1)."""
     data = given.data[min(k, given.data.shape[0] - 1)]
-    n = c.shape[1]
     for e in range(bands.entry.size):
-        i, j = bands.one[e], bands.two[e]
-        matrix[bands.low[e], bands.apart[e]] += factor * (data[bands.entry[e]] * c[i // n, i % n] * c[j // n, j % n])
+        matrix[bands.low[e], bands.apart[e]] += factor * (data[bands.entry[e]] * c[bands.one[e]] * c[bands.two[e]])
 
 
 @part
@@ -134,7 +134,7 @@ def substitute(matrix, x):
 def prepare(rule, lin, order, first, h, single, double):
     """The factors of I + h a C^T D C + (h a)^2 C^T S C for the eigenvalues of a, with C of the stage in the middle."""
     middle = first + rule.b.size // 2
-    c = lin.c[middle]
+    c = lin.flat[middle]
     for e in range(rule.real.size):
         filled(lin, order, middle, c, h * rule.real[e], single[e])
     for e in range(rule.pairs.size):
@@ -210,9 +210,8 @@ def turn(lin, k, dq, along, moved, pulled):
     """moved += N dq; pulled -= P dq."""
     rows, n = lin.c.shape[1:]
     for h in range(lin.row.size):
-        along[:] = 0.0
         at = lin.row[h] * n
-        times(lin.heading, 0, dq[at : at + n], 1.0, along)
+        times(lin.heading, 0, dq[at : at + n], 1.0, along, True)
         for row in range(rows):
             for i in range(n):
                 moved[row * n + i] += lin.turned[k, h, row, i] * along[i]
@@ -232,6 +231,16 @@ def spread(c, p, to):
 
 
 @part
+def spread_more(c, p, to):
+    """to += C p."""
+    n = c.shape[1]
+    for row in range(c.shape[0]):
+        at = column(row) * n
+        for i in range(n):
+            to[row * n + i] += c[row, i] * p[at + i]
+
+
+@part
 def gather(c, q, to):
     """to += C^T q."""
     n = c.shape[1]
@@ -241,14 +250,26 @@ def gather(c, q, to):
             to[at + i] += c[row, i] * q[row * n + i]
 
 
-@part
-def replaced(new, old):
-    """Copy new to old; returns the largest change and the largest entry."""
+@part(fastmath={"contract", "nnan", "nsz", "reassoc"})
+def added(change, to):
+    """to += change; returns the largest change over the largest entry."""
     moved, size = 0.0, 0.0
-    for i in range(new.size):
-        moved, size = max(moved, abs(new[i] - old[i])), max(size, abs(new[i]))
-        old[i] = new[i]
-    return moved, size
+    for row in range(to.shape[0]):
+        for i in range(to.shape[1]):
+            to[row, i] += change[row, i]
+            moved, size = max(moved, abs(change[row, i])), max(size, abs(to[row, i]))
+    return moved / size if size > 0 else moved
+
+
+@part(fastmath={"contract", "nnan", "nsz", "reassoc"})
+def replaced(new, old):
+    """Copy new to old; returns the largest change over the largest entry."""
+    moved, size = 0.0, 0.0
+    for row in range(new.shape[0]):
+        for i in range(new.shape[1]):
+            moved, size = max(moved, abs(new[row, i] - old[row, i])), max(size, abs(new[row, i]))
+            old[row, i] = new[row, i]
+    return moved / size if size > 0 else moved
 
 
 @kernel
@@ -265,6 +286,7 @@ def back(rule, lin, order, h, tolerance, seeds, at, value, m):
     double = np.empty((rule.pairs.size, np_, order.width + 1), np.complex128)
     mu, nu = np.zeros((s, nq)), np.zeros((s, np_))
     x, y, w, dragged = np.empty((s, nq)), np.empty((s, np_)), np.empty((s, nq)), np.zeros((s, nq))
+    new, pulled, force, damped = np.empty((s, nq)), np.empty((s, nq)), np.empty(nq), lin.drag.indices.size > 0
     rest, change, along, inner, complex_ = (
         np.empty((s, np_)),
         np.empty((s, np_)),
@@ -272,7 +294,7 @@ def back(rule, lin, order, h, tolerance, seeds, at, value, m):
         np.empty(np_),
         np.empty(np_, np.complex128),
     )
-    late, later, new, force = np.zeros((s, nq + np_)), np.zeros((s, nq + np_)), np.empty(nq), np.empty(nq)
+    late, later = np.zeros((s, nq + np_)), np.zeros((s, nq + np_))
     for k in range(steps - 1, -1, -1):
         if interrupted(20 * s * (nq + np_)):
             return -1
@@ -289,29 +311,26 @@ def back(rule, lin, order, h, tolerance, seeds, at, value, m):
                     mu[i, j] = guess
                 else:
                     nu[i, j - nq] = guess
+        for j in range(s):
+            spread(lin.c[k * s + j], nu[j], w[j])
+            times(lin.stiff, k * s + j, w[j], 1.0, pulled[j], True)
         sweep, off = 0, np.inf
         while sweep < SWEEPS and off > tolerance:
             for j in range(s):
-                spread(lin.c[k * s + j], nu[j], w[j])
-                if lin.drag.indices.size > 0:
+                if damped:
                     dragged[j] = 0.0
                     across(lin.drag, k * s + j, w[j], -1.0, dragged[j])
                 for i in range(nq):
                     force[i] = mu[j, i] + dragged[j, i]
-                x[j] = 0.0
-                across(lin.stiff, k * s + j, w[j], -1.0, x[j])
+                    x[j, i] = -pulled[j, i]
                 turn_back(lin, k * s + j, force, nu[j], along, x[j])
-            off, size = 0.0, 0.0
             for i in range(s):
-                mix(rule.a, True, i, x, new, h)
+                mix(rule.a, True, i, x, new[i], h)
                 for j in range(nq):
-                    new[j] += h * rule.b[i] * value[j]
-                moved, most = replaced(new, mu[i])
-                off, size = max(off, moved), max(size, most)
-            off = off / size if size > 0 else off
+                    new[i, j] += h * rule.b[i] * value[j]
             for j in range(s):
                 for i in range(nq):
-                    force[i] = mu[j, i] + dragged[j, i]
+                    force[i] = new[j, i] + dragged[j, i]
                 y[j] = 0.0
                 gather(lin.c[k * s + j], force, y[j])
             for i in range(s):
@@ -319,14 +338,24 @@ def back(rule, lin, order, h, tolerance, seeds, at, value, m):
                 for j in range(np_):
                     rest[i, j] += h * rule.b[i] * value[nq + j] - nu[i, j]
             correct(rule, True, order, single, double, rest, inner, complex_, change)
-            moved, size = 0.0, 0.0
+            off = added(change, nu)
+            for j in range(s):  # what that does to mu
+                spread(lin.c[k * s + j], nu[j], w[j])
+                times(lin.stiff, k * s + j, w[j], 1.0, force, True)
+                for i in range(nq):
+                    x[j, i] += pulled[j, i] - force[i]
+                    pulled[j, i] = force[i]
             for i in range(s):
-                for j in range(np_):
-                    nu[i, j] += change[i, j]
-                    moved, size = max(moved, abs(change[i, j])), max(size, abs(nu[i, j]))
-            off = max(off, moved / size if size > 0 else moved)
+                mix(rule.a, True, i, x, new[i], h)
+                for j in range(nq):
+                    new[i, j] += h * rule.b[i] * value[j]
+            off = max(off, replaced(new, mu))
             sweep += 1
-        if not off <= tolerance:
+        total = 0.0
+        for i in range(s):
+            for j in range(np_):
+                total += nu[i, j]
+        if not (off <= tolerance and np.isfinite(total)):
             return steps - 1 - k
         later[:] = late
         for i in range(s):
@@ -352,40 +381,51 @@ def forward(rule, lin, order, h, tolerance, right, y):
     nq, np_ = rows * n, lin.pull.shape[2] * n
     single = np.empty((rule.real.size, np_, order.width + 1))
     double = np.empty((rule.pairs.size, np_, order.width + 1), np.complex128)
-    v, pulled, rest, change = np.empty((s, nq)), np.empty((s, np_)), np.empty((s, np_)), np.empty((s, np_))
-    along, inner, complex_, new, force = np.empty(n), np.empty(np_), np.empty(np_, np.complex128), np.empty(nq), np.empty(nq)
+    v, moved, new, q = np.empty((s, nq)), np.empty((s, nq)), np.empty((s, nq)), np.empty((s, nq))
+    pulled, rest, change, pi = np.empty((s, np_)), np.empty((s, np_)), np.empty((s, np_)), np.empty((s, np_))
+    along, inner, complex_, force = np.empty(n), np.empty(np_), np.empty(np_, np.complex128), np.empty(nq)
+    damped = lin.drag.indices.size > 0
     prepare(rule, lin, order, 0, h, single, double)
     sweep, off = 0, np.inf
+    for j in range(s):
+        q[j], pi[j], moved[j] = y[j, :nq], y[j, nq:], 0.0
+        turn(lin, j, q[j], along, moved[j], pulled[j])
     while sweep < SWEEPS and off > tolerance:
         for j in range(s):
-            spread(lin.c[j], y[j, nq:], v[j])
-            turn(lin, j, y[j, :nq], along, v[j], pulled[j])
-        off, size = 0.0, 0.0
+            spread(lin.c[j], pi[j], v[j])
+            for i in range(nq):
+                v[j, i] += moved[j, i]
         for i in range(s):
-            mix(rule.a, False, i, v, new, h)
+            mix(rule.a, False, i, v, new[i], h)
             for j in range(nq):
-                new[j] += right[i, j]
-            moved, most = replaced(new, y[i, :nq])
-            off, size = max(off, moved), max(size, most)
-        off = off / size if size > 0 else off
+                new[i, j] += right[i, j]
         for j in range(s):
-            spread(lin.c[j], y[j, nq:], v[j])
-            pulled[j] = 0.0
-            turn(lin, j, y[j, :nq], along, v[j], pulled[j])
-            force[:] = 0.0
-            times(lin.stiff, j, y[j, :nq], -1.0, force)
-            times(lin.drag, j, v[j], -1.0, force)
+            pulled[j], moved[j] = 0.0, 0.0
+            turn(lin, j, new[j], along, moved[j], pulled[j])
+            times(lin.stiff, j, new[j], -1.0, force, True)
+            if damped:
+                for i in range(nq):
+                    v[j, i] = moved[j, i]
+                spread_more(lin.c[j], pi[j], v[j])
+                times(lin.drag, j, v[j], -1.0, force, False)
             gather(lin.c[j], force, pulled[j])
         for i in range(s):
             mix(rule.a, False, i, pulled, rest[i], h)
             for j in range(np_):
-                rest[i, j] += right[i, nq + j] - y[i, nq + j]
+                rest[i, j] += right[i, nq + j] - pi[i, j]
         correct(rule, False, order, single, double, rest, inner, complex_, change)
-        moved, size = 0.0, 0.0
+        off = added(change, pi)
+        for j in range(s):  # what that does to q
+            spread(lin.c[j], change[j], v[j])
+            moved[j] = 0.0
         for i in range(s):
-            for j in range(np_):
-                y[i, nq + j] += change[i, j]
-                moved, size = max(moved, abs(change[i, j])), max(size, abs(y[i, nq + j]))
-        off = max(off, moved / size if size > 0 else moved)
+            mix(rule.a, False, i, v, force, h)
+            for j in range(nq):
+                new[i, j] += force[j]
+        for j in range(s):
+            turn(lin, j, new[j], along, moved[j], pulled[j])
+        off = max(off, replaced(new, q))
         sweep += 1
-    return sweep if off <= tolerance else -1
+    for j in range(s):
+        y[j, :nq], y[j, nq:] = q[j], pi[j]
+    return sweep if off <= tolerance and np.isfinite(pi.sum()) else -1

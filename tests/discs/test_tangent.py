@@ -8,14 +8,18 @@ import pytest
 from discs import Chain, Problem, SimulationError, State, simulate
 from discs.__main__ import main
 from discs.analysis import lyapunov, modes
-from discs.analysis.tangent import METHODS, Flow
+from discs.analysis.stages import At, ConstantEquations, equations
+from discs.analysis.tangent import METHODS, Flow, Swept, back, tangent
 from discs.chains.twist import untwisting_chain
 from discs.differences import slope
-from discs.loads import Damping, Motor, Rest, Torque, signals
+from discs.integrators.tableaux import tableau
+from discs.kernels import tangent as kernels
+from discs.loads import Damping, Motor, Rest, Slope, Torque, signals
 from tests.conftest import Model, models, uneven
 
 pytestmark = pytest.mark.slow  # steps with sparse factors
 
+LOADS = Slope(0.2, -0.4), Damping(rolling=0.3, torsion=0.1), Torque(0.3, signals.sine(1.0, 2.0)), Rest(curvature=0.4)
 CHAINS = [Model("consistent", "field"), Model("ring", "unit"), Model("springs", "true"), Model("ring", "steered")]
 
 
@@ -45,6 +49,42 @@ def test_tangent_is_the_derivative_of_the_step(model, method):
     right = slope(lambda size: flow.step(flow.start + size * v, t, h)[0], 0.3)
     np.testing.assert_allclose(tangent.forward(v), right, rtol=0, atol=1e-8 * np.abs(right).max())
     assert w @ tangent.forward(v) == pytest.approx(tangent.back(w) @ v, rel=1e-12)
+
+
+@pytest.mark.parametrize("stages", [1, 2, 4])
+@models([Model("springs", "field"), Model("consistent", "unit"), Model("ring", "field")])
+def test_sweeps_solve_the_systems_of_sparse_matrices(model, stages, kernels_as_python):
+    """Those of steps and of their transposes, through two steps with something added between."""
+    problem, rng, rule, h = uneven(9, model), np.random.default_rng(3), tableau(stages), 0.05
+    if stages > 1:
+        problem = replace(problem, loads=LOADS)
+    found, start = equations(problem), problem.start()
+    assert isinstance(found, ConstantEquations)
+    q = start.hi + 1e-2 * rng.normal(size=(2 * stages, 3, 9))
+    at = found.at(q, rng.normal(size=(2 * stages, 1, 9)), 0.3 + 0.1 * np.arange(2 * stages))
+    first, second = (tangent(rule, h, found.each(q[i], at.pi[i], at.t[i])) for i in (slice(0, stages), slice(stages, None)))
+    w, v, kick = rng.normal(size=(3, 36))
+    value, m = back(rule, h, found, at, w, True, {0: kick})
+    middle = second.back(w) + kick
+    np.testing.assert_allclose(value, first.back(middle), atol=1e-11)
+    np.testing.assert_allclose(m[:stages], first.rates_back(middle, first.stages_back(middle)), atol=1e-11)
+    swept = Swept(rule, h, found, At(*(part[:stages] for part in at[:-1])))
+    both = np.stack([v, w], axis=1)
+    np.testing.assert_allclose(swept.forward(both), first.forward(both), atol=1e-11)
+    np.testing.assert_allclose(swept.back(both), first.back(both), atol=1e-11)
+
+
+def test_sweeps_that_do_not_converge_leave_it_to_sparse_matrices(kernels_as_python):
+    """A rough state: the directions of rolling change from disc to disc faster than a sweep can follow."""
+    problem, rng, rule = uneven(9, Model("springs", "field")), np.random.default_rng(3), tableau(1)
+    found = equations(problem)
+    at = found.at(problem.start().hi + 0.3 * rng.normal(size=(1, 3, 9)), 20 * rng.normal(size=(1, 1, 9)), np.zeros(1))
+    sparse = tangent(rule, 1.0, found.each(at.q, at.pi, at.t))
+    right = np.ones((1, 36))
+    assert kernels.forward(rule, found.compiled(at), found.order, 1.0, 1e-13, right, right.copy()) == -1
+    w = rng.normal(size=36)
+    np.testing.assert_array_equal(Swept(rule, 1.0, found, at).forward(w), sparse.forward(w))
+    np.testing.assert_allclose(back(rule, 1.0, found, at, w, True)[0], sparse.back(w), rtol=1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)
