@@ -35,9 +35,10 @@ class Sparse(NamedTuple):
 class Stages(NamedTuple):
     """The linearised equations at M stages, the stages of a step next to each other; `discs.analysis.stages` makes them.
 
-    c : (M, rows, n), and flat, the same as (M, rows n). turned : (M, headings, rows, n), dC/dh pi. pull : (M, headings, columns, n),
-    dC/dh . g. heading : h = heading q of the rows `row`, (headings,). stiff, drag : S and D, of q row after row; drag without
-    entries for none.
+    c : (M, rows, n), and flat, the same as (M, rows n).
+    turned : (M, headings, rows, n), dC/dh pi. pull : (M, headings, columns, n), dC/dh . g.
+    heading : h = heading q of the rows `row`, (headings,).
+    stiff, drag : S and D, of q row after row; drag without entries for none.
     """
 
     c: NDArray
