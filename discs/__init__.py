@@ -16,6 +16,7 @@ from discs.integrators import (
     Radau5,
     Suzuki4,
 )
+from discs.linkage import Linkage, LinkageProblem, LinkageState
 from discs.mechanics import MechanicalSystem
 from discs.mechanics.friction import first_slip, friction_needed
 from discs.mechanics.lagrange import lagrange_dalembert
@@ -36,6 +37,9 @@ __all__ = [
     "Integrator",
     "KahanLi6",
     "Leapfrog",
+    "Linkage",
+    "LinkageProblem",
+    "LinkageState",
     "McLachlanPerlmutter",
     "MechanicalSystem",
     "Midpoint",

@@ -15,6 +15,8 @@ from discs.arrays import Float
 from discs.integrators import Integrator, OneStep, find, from_settings
 from discs.integrators.work import Cut
 from discs.kernels.background import usual
+from discs.linkage import LinkageProblem
+from discs.linkage.motion import run as linkage_run
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.doubt import doubted
@@ -38,7 +40,7 @@ Given = ParamSpec("Given")
 
 
 def simulate(
-    problem: Problem,
+    problem: Problem | LinkageProblem,
     method: str | Integrator | None = None,
     dt: float | None = None,
     frames: int | ArrayLike = 101,
@@ -55,7 +57,8 @@ def simulate(
 
     Parameters
     ----------
-    problem : the chain, its initial state, loads and duration.
+    problem : the chain, its initial state, loads and duration. A `LinkageProblem` runs by the midpoint rule of
+        `discs.linkage.motion` on the plain engine, with dt or tol.
     method : name of an integrator (`discs.integrators.METHODS`; docs/choosing.md helps to choose), an integrator with settings, as
         `Midpoint(sweeps=2)`, or "auto". None is "midpoint" if dt is given, otherwise "auto".
     dt : time step, at most the duration; for SciPy's methods the longest step. None is `suggest_dt(problem, method)`.
@@ -91,6 +94,10 @@ def simulate(
     SimulationError : if the kinetic energy exceeds ten times the initial total energy (no exact motion does), if a value is not
         finite, if a disc loses its heading (rolling="unit"), or if `tol` is not reached.
     """
+    if isinstance(problem, LinkageProblem):
+        if checkpoint is not None or events != ():
+            raise ValueError("a linkage runs without checkpoint and events: leave them out, and save the run by its `save`")
+        return linkage_run(problem, method, dt, frames, want, progress, tol)
     if not isinstance(problem, Problem):
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
     engine, nothing = engine or usual(), method is None and dt is None

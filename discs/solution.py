@@ -236,6 +236,11 @@ class Solution(Result):
                 "a free rod does not roll, and its state is more than a State: go on by free_rod with r0 = (x, y), "
                 "v0 = (x_rate, y_rate), theta0 = theta and omega0 = omega of a frame"
             )
+        if self.stats.get("linkage"):
+            raise ValueError(
+                "this is the run of a linkage, whose state is a LinkageState: take LinkageState(run.x[i], run.y[i], run.phi[i], "
+                "run.theta[i], run.x_rate[i], run.y_rate[i], run.phi_rate[i])"
+            )
         if self.phi is None:
             return State(self.x[i], self.y[i], self.theta[i], self.omega[i])
         if self.phi_rate is None:

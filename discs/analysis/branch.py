@@ -98,7 +98,7 @@ def relative_equilibria(make: Callable[[float], Problem], values: ArrayLike, cou
         if not isinstance(problem, Problem):
             raise ValueError(f"make must return a Problem; got {checks.shown(problem)} for {value:g}")
         try:
-            guess = _driven(problem, found[-1].problem.initial if found else problem.initial)
+            guess = _driven(problem, found[-1].problem.initial if found else problem.initial)  # type: ignore[arg-type]  # of a chain
             found.append(modes(problem, count, _steady(problem, guess)))
         except ValueError as error:
             raise ValueError(f"at the parameter {value:g}: {error}") from None

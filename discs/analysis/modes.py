@@ -26,6 +26,8 @@ import scipy  # its parts, slow to import, when they are used
 from discs import checks
 from discs.analysis.steady import Steady, described, steady
 from discs.arrays import Complex, Float, Int
+from discs.linkage import LinkageProblem, LinkageState, small
+from discs.linkage.small import Small
 from discs.problem import Problem, State
 
 DENSE = 300  # unknowns
@@ -59,6 +61,15 @@ class Pencil:
         ]
         self._matrix = scipy.sparse.block_array(blocks, format="csc")
         self._unknown = diagonal((np.arange(self._matrix.shape[0]) < self.size).astype(float), format="csc")
+
+    @classmethod
+    def of_matrix(cls, matrix: Float) -> "Pencil":
+        """The pencil of a matrix A that is known, without further unknowns."""
+        made = cls.__new__(cls)
+        made.size = len(matrix)
+        made._matrix = scipy.sparse.csc_array(matrix)
+        made._unknown = scipy.sparse.eye_array(made.size, format="csc")
+        return made
 
     def fastest(self, count: int) -> tuple[Complex, Complex]:
         """The largest eigenvalues of A, without the digits that slow ones have otherwise, and their vectors."""
@@ -123,28 +134,24 @@ class Modes:
     shape: Complex
     zero: int
     symmetries: tuple[str, ...]
-    problem: Problem
-    state: Steady
+    problem: Problem | LinkageProblem
+    state: Steady | Small
 
     @property
     def growth(self) -> float:
         """The largest real part of the rates, per time: positive if the motion is unstable by one of these modes."""
         return float(self.rate.real.max(initial=-np.inf))
 
-    def displaced(self, mode: int, size: float = 1e-3, phase: float = 0.0) -> State:
+    def displaced(self, mode: int, size: float = 1e-3, phase: float = 0.0) -> State | LinkageState:
         """The state displaced along a mode: by the real part of size e^{i phase} shape, with the rates of that mode."""
-        lin, c = self.state.equations, size * np.exp(1j * phase)
         if checks.whole("mode", mode, 0) >= self.rate.size:
             raise ValueError(f"mode must be below {self.rate.size}, the number of modes; got {mode}")
-        shape = self.shape[mode]
-        q = lin.z.hi + (c * shape).real
-        values = dict(zip(lin.system.rows, q, strict=True))
-        rates = dict(zip(("omega", "phi_rate"), lin.velocity[2:] + (c * self.rate[mode] * shape[2:]).real, strict=False))
-        return State(**values, **rates)
+        return self.state.displaced(size * np.exp(1j * phase) * self.shape[mode], self.rate[mode])
 
     def table(self) -> str:
         """The rates in a table."""
-        lines = [f"{self.problem.chain.n} discs {described(self.state)}; {self.zero} zero modes"]
+        bodies = "nodes" if isinstance(self.problem, LinkageProblem) else "discs"
+        lines = [f"{self.shape.shape[2]} {bodies} {described(self.state)}; {self.zero} zero modes"]
         if self.symmetries:
             lines[0] += f", of displacements by {', '.join(self.symmetries)} among others"
         lines += ["mode      growth   frequency      period"]
@@ -154,7 +161,7 @@ class Modes:
         return "\n".join(lines)
 
 
-def modes(problem: Problem, count: int = 8, at: State | None = None) -> Modes:
+def modes(problem: Problem | LinkageProblem, count: int = 8, at: State | LinkageState | None = None) -> Modes:
     """The slowest modes about an equilibrium or a steady motion.
 
     Parameters
@@ -172,19 +179,27 @@ def modes(problem: Problem, count: int = 8, at: State | None = None) -> Modes:
     ValueError : if the motion of the state is not steady, or the chain has fewer modes than `count`.
     """
     count = checks.whole("count", count, 1)
-    state = steady(problem, at)
-    pencil = Pencil(state)
+    if isinstance(problem, LinkageProblem):
+        if at is not None and not isinstance(at, LinkageState):
+            raise ValueError(f"at must be a LinkageState, as the problem is one of a linkage; got {checks.shown(at)}")
+        linkage = small.steady(problem, at)
+        state: Steady | Small = linkage
+        pencil, extra = Pencil.of_matrix(linkage.matrix), linkage.extra
+    else:
+        chain = steady(problem, at)  # type: ignore[arg-type]  # it refuses another kind of state
+        state, pencil, extra = chain, Pencil(chain), 0
     rates, vectors, zero = _slowest(pencil, count, state.slow or 1 / problem.duration)
+    zero -= extra
     if count > rates.size:
         raise ValueError(
             f"count must be at most {rates.size}, as the other {zero} modes of the {pencil.size} are zero; got {count}"
         )
     order = _sorted(rates)[:count]
     rates, vectors = rates[order], vectors[:, order]
-    q = vectors[: state.equations.basis.size].T.reshape(count, *state.equations.basis.shape)
-    scaled = (q / state.equations.system.scale[:, None]).reshape(count, -1)
+    q = state.positions(vectors)
+    scaled = (q / state.scale[:, None]).reshape(count, -1)
     largest = scaled[np.arange(count), np.argmax(np.abs(scaled) > (1 - 1e-9) * np.abs(scaled).max(axis=1, keepdims=True), axis=1)]
-    return Modes(rates, q / largest[:, None, None], zero, state.symmetries(), state.equations.problem, state)
+    return Modes(rates, q / largest[:, None, None], zero, state.symmetries(), state.problem, state)
 
 
 def _sorted(rates: Complex) -> Int:

@@ -15,7 +15,8 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
 from discs.analysis.linear import Linearised, linearise
-from discs.arrays import Float, Matrix
+from discs.arrays import Complex, Float, Matrix
+from discs.linkage.small import Small
 from discs.loads import signals
 from discs.problem import Problem, State
 from discs.skew import Phase
@@ -55,6 +56,33 @@ class Steady:
         inertia = np.sum(1 / self.equations.basis[2] ** 2) / (n * chain.k)
         torsion, bending = (np.mean(np.asarray(stiff)) for stiff in (chain.torsion_stiffness, chain.bending_stiffness))
         return float(np.sqrt((torsion + bending * (radius * q) ** 2) / inertia) * q)
+
+    @property
+    def problem(self) -> Problem:
+        """The chain and its loads, with the state as its initial one."""
+        return self.equations.problem
+
+    @property
+    def velocity(self) -> Float:
+        """q', (rows, n)."""
+        return self.equations.velocity
+
+    @property
+    def scale(self) -> Float:
+        """Units of the coordinates, (rows,)."""
+        return self.equations.system.scale
+
+    def positions(self, vectors: Complex) -> Complex:
+        """Displacements (count, rows, n) from vectors of unknowns, as columns."""
+        shape = self.equations.basis.shape
+        return vectors[: shape[0] * shape[1]].T.reshape(-1, *shape)
+
+    def displaced(self, change: Complex, rate: complex) -> State:
+        """The state displaced by the real part of `change` (rows, n), with its rates."""
+        lin = self.equations
+        values = dict(zip(lin.system.rows, lin.z.hi + change.real, strict=True))
+        rates = dict(zip(("omega", "phi_rate"), lin.velocity[2:] + (rate * change[2:]).real, strict=False))
+        return State(**values, **rates)
 
     def symmetries(self) -> tuple[str, ...]:
         """The rigid motions, and "roll", by which the state can be displaced without any change: each is a zero mode."""
@@ -192,9 +220,9 @@ def _alike(found: Steady) -> None:
             )
 
 
-def described(state: Steady) -> str:
+def described(state: Steady | Small) -> str:
     """The motion in words."""
-    fastest = float(np.abs(state.equations.velocity[2]).max())
-    if not np.any(state.equations.velocity):
+    fastest = float(np.abs(state.velocity[2]).max())
+    if not np.any(state.velocity):
         return "at rest"
     return f"in steady motion: u = ({state.drift[0]:.4g}, {state.drift[1]:.4g}), Omega = {state.turning:.4g}, omega = {fastest:.4g}"

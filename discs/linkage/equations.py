@@ -14,18 +14,16 @@ and its compliance k/A, k/G: zero is rigid, in the same equations. All functions
 """
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from discs.arrays import Array, Bool, Float
-
-if TYPE_CHECKING:
-    from discs.linkage.linkage import Linkage
+from discs.linkage.linkage import Linkage
 
 
 class Shape(NamedTuple):
-    """Of links: d (..., 2, n_links), differences of places; middle, bend, twist (..., n_links): direction, changes of b and theta."""
+    """Of links: d (..., 2, n_links), differences of places; middle, bend, twist (..., n_links), direction, changes of b, theta."""
 
     d: Array
     middle: Array
@@ -42,7 +40,7 @@ class Equations:
     compliance : (2, n_links), k/A and k/G. links : n_links.
     """
 
-    def __init__(self, of: "Linkage") -> None:
+    def __init__(self, of: Linkage) -> None:
         self.of, self.n, self.wheel, self.closed = of, of.n, of.wheels, of.closed
         self.first, self.second = of.ends
         self.links = self.first.size
@@ -126,7 +124,8 @@ class Equations:
 
     def moments(self, shape: Shape, rest: Float) -> Array:
         """Moments of links, (..., n_links), for rest curvatures (n_links,)."""
-        return self.bending * (shape.bend - self.k * rest)
+        found: Array = self.bending * (shape.bend - self.k * rest)
+        return found
 
     def dragged(self, v: Array, g: Array) -> Array:
         """g less the drag of wheels at velocities q' = v, both (..., 4, n)."""
@@ -146,7 +145,7 @@ class Equations:
     # The equations, for accelerations
 
     def balance(self, q: Array, w: Array, change: Array, stress: Array, rest: Float) -> tuple[Array, Array]:
-        """The residuals of m w' + C^T (...) = 0 at nodes, (..., 3, n), and of links, (..., 2, n_links): compliance n - gap, or gap''.
+        """Residuals of m w' + C^T (...) = 0 at nodes, (..., 3, n), and of links, (..., 2, n_links): compliance n - gap, or gap''.
 
         change : w', (..., 3, n). stress : n, (..., 2, n_links). rest : rest curvatures, (n_links,).
         """
@@ -183,7 +182,7 @@ class Equations:
     @property
     def size(self) -> int:
         """Number of unknowns (w, n)."""
-        return 3 * self.n + 2 * self.links
+        return 3 * self.n + 2 * int(self.links)
 
     def pack(self, w: Array, stress: Array) -> Array:
         """Node after node, each with its link: from (..., 3, n) and (..., 2, n_links) to (..., size)."""

@@ -1,8 +1,7 @@
-"""Nodes joined by links: the parameters, a state, and the problem to run."""
+"""Nodes joined by links: the parameters, and a state."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,7 @@ from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Bool, Float
-from discs.linkage import starting
-from discs.linkage.equations import Equations
 
-CLOSE = 1e-9  # relative; larger differences from a constraint are refused
 HELD = {True: ("roll", "phi"), False: ("x", "y", "phi")}  # what can be held, with and without a wheel
 PER_NODE = ("mass", "heading_inertia", "spin_inertia", "rolling_drag")  # each at least 0
 PER_LINK = ("stretch_compliance", "shear_compliance", "bending_stiffness", "torsion_stiffness")
@@ -23,8 +19,8 @@ PER_LINK = ("stretch_compliance", "shear_compliance", "bending_stiffness", "tors
 class Linkage:
     """A chain of `n` nodes in the plane, with or without a wheel, joined by links that may be rigid.
 
-    The configuration of a node is (x, y, theta, phi), as for a `discs.SteeredChain`: phi is the direction of the axle, theta the roll.
-    A node with a wheel moves along J (cos phi, sin phi) only, by R theta'; a node without one moves freely, and its theta stays.
+    A node has (x, y, theta, phi), as in a `discs.SteeredChain`: phi is the direction of the axle, theta the roll. A node with a
+    wheel moves along J (cos phi, sin phi) only, by R theta'; a node without one moves freely, and its theta stays.
     The body of a node looks along phi - psi, with psi its mounting angle: psi = 0 is the rod of rolling discs, whose axles are
     along the line, and psi = 90 degrees a snake, whose wheels roll along the line. See docs/snakes.md for the equations.
 
@@ -157,11 +153,6 @@ class Linkage:
         value = checks.called("rest_curvature", given, t, where=f" at t = {t:g}") if callable(given) else given
         return checks.field("rest_curvature of links", value, self.n - (not self.closed))
 
-    @cached_property
-    def equations(self) -> Equations:
-        """The equations of motion."""
-        return Equations(self)
-
 
 def _settled(name: str, value: ArrayLike, size: int, least: float | None = None, strict: bool = False) -> Float:
     return np.array(checks.field(name, value, size, least=least, strict=strict))
@@ -187,41 +178,3 @@ class LinkageState:
         n = max(value.size for value in given.values())
         for name, value in given.items():
             object.__setattr__(self, name, checks.field(f"initial {name}", value, n))
-
-
-@dataclass(frozen=True, eq=False)
-class LinkageProblem:
-    """A linkage, its initial state and the time to run.
-
-    Raises
-    ------
-    ValueError : if the state has another number of nodes, is off a rigid link, or moves against a constraint, naming the node or
-        link; if constraints are redundant (a rigid loop), or a velocity that they allow has no inertia, naming its node.
-    """
-
-    linkage: Linkage
-    initial: LinkageState
-    duration: float
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.linkage, Linkage) or not isinstance(self.initial, LinkageState):
-            raise ValueError(
-                f"a LinkageProblem takes a Linkage, a LinkageState and a duration; got {checks.shown(self.linkage)} and "
-                f"{checks.shown(self.initial)}"
-            )
-        object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
-        if np.size(self.initial.x) != self.linkage.n:
-            raise ValueError(f"initial state must have the linkage's {self.linkage.n} nodes; got {np.size(self.initial.x)}")
-        starting.check(self.linkage.equations, *self.start())
-
-    def start(self) -> tuple[Float, Float]:
-        """Coordinates (4, n), rows x, y, theta, phi, and velocities (3, n) of `discs.linkage.equations`."""
-        z, of = self.initial, self.linkage.equations
-        q = np.array([z.x, z.y, z.theta, z.phi], dtype=float)
-        rates = np.array([z.x_rate, z.y_rate, z.phi_rate], dtype=float)
-        return q, starting.speeds(of, q, rates)
-
-    def energy(self) -> float:
-        """Kinetic and potential energy of the initial state, that of the dead loads included."""
-        q, w = self.start()
-        return self.linkage.equations.energy(q, w, 0.0)

@@ -1,6 +1,7 @@
 r"""The midpoint rule for linkages, in mixed form: energy-exact, with rigid links as the case of no compliance.
 
-With w the mean velocity of a step, q_1 = q_0 + h C(phi_m) w and phi_m = phi_0 + h phi'/2, one solves for w and the forces n of links
+With w the mean velocity of a step, q_1 = q_0 + h C(phi_m) w and phi_m = phi_0 + h phi'/2, the unknowns are w and the forces n of
+links:
 
     (2/h) m (w - w_0) + C(phi_m)^T (B^T n + mean grad V - f) = 0,   compliance n = (gap_0 + gap_1)/2,   rigid: gap_1 = 0,
 
@@ -18,9 +19,10 @@ import scipy  # its parts, slow to import, when they are used
 from discs.arrays import Array, Float
 from discs.linkage.equations import Equations, columns
 
-SETTLED = 1e-16  # of moves, relative to the length, or rad
+SETTLED = 1e-15  # of moves, relative to the length, or rad
 ROUNDED = 1e-11  # moves that do not shrink any more below this are rounding
-SWEEPS, QUICK = 30, 4
+SWEEPS = 30
+FRESH, KEPT = 10.0, 0.2  # a sweep may leave so much of the last change, with a matrix of this step and with an older one
 
 
 class Moment(NamedTuple):
@@ -94,7 +96,7 @@ class Stepper:
         while True:
             if fresh:
                 self._factor(y, z, h, rest)
-            found = self._newton(y, z, h, rest, SWEEPS if fresh else QUICK)
+            found = self._newton(y, z, h, rest, FRESH if fresh else KEPT)
             if found is not None:
                 break
             if fresh:
@@ -116,11 +118,11 @@ class Stepper:
             raise ArithmeticError from None
         self._for, self.matrices = h, self.matrices + 1
 
-    def _newton(self, y: Float, z: Moment, h: float, rest: Float, sweeps: int) -> Float | None:
+    def _newton(self, y: Float, z: Moment, h: float, rest: Float, slowest: float) -> Float | None:
         """The solution near y, or None if it was not reached."""
         of, last = self.of, np.inf
         assert self._factors is not None
-        for _ in range(sweeps):
+        for _ in range(SWEEPS):
             change = self._factors.solve(self.residual(y, z, h, rest))
             self.solves += 1
             y = y - change
@@ -128,7 +130,7 @@ class Stepper:
             moves = h * max(float(w[:2].max()) / of.of.length, float(w[2].max()))
             if moves <= SETTLED or (moves <= ROUNDED and moves >= 0.5 * last):
                 return y
-            if not moves < 10 * last:
+            if not moves < slowest * last:
                 return None
             last = moves
         return None

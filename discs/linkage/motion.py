@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
-from discs.linkage.linkage import LinkageProblem
 from discs.linkage.midpoint import Moment, Stepper
+from discs.linkage.problem import LinkageProblem
 from discs.running.failure import SimulationError
 from discs.running.frames import frame_times, steps_before
 from discs.running.progress import NO_BAR, Progress
@@ -27,7 +27,7 @@ def run(
     frames: int | ArrayLike = 101,
     want: Iterable[str] = (),
     progress: bool = True,
-    tol: float | None = None,
+    tol: object = None,
 ) -> Solution:
     """A run by the midpoint rule with the step dt or, without dt, with steps halved until their error is within tol (1e-4).
 
@@ -68,7 +68,7 @@ def run(
 
 
 def _fixed(problem: LinkageProblem, h: float, times: Float, progress: bool) -> Solution:
-    of, n = problem.linkage.equations, problem.linkage.n
+    of = problem.equations
     q, w = problem.start()
     z, stepper, extra = Moment(q, w, np.zeros((2, of.links))), Stepper(of), Stepper(of)
     spent, done, rows = np.zeros(2), 0, []
@@ -82,8 +82,8 @@ def _fixed(problem: LinkageProblem, h: float, times: Float, progress: bool) -> S
                 return by.step(z, t, length)
         except ArithmeticError:
             said = (
-                f"the step of {length:g} has no solution that Newton's method finds: take a smaller dt; if that does not help, rigid "
-                "links and wheels lock or become dependent there"
+                f"the step of {length:g} has no solution that Newton's method finds: take a smaller dt; if that does not help, "
+                "rigid links and wheels lock or become dependent there"
             )
             raise SimulationError(said, done, t, int(np.argmax(np.abs(z.w[2])))) from None
 
@@ -109,6 +109,7 @@ def _fixed(problem: LinkageProblem, h: float, times: Float, progress: bool) -> S
         "steps": done,
         "solves": stepper.solves + extra.solves,
         "seconds": clock.perf_counter() - started,
+        "linkage": True,
     }
     if np.ptp(problem.linkage.radius) == 0:
         stats["radius"] = float(np.max(problem.linkage.radius))

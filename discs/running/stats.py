@@ -47,6 +47,7 @@ class Stats(TypedDict, total=False):
     elements: int
     nodes: int
     radius: float
+    linkage: bool  # whether it is the run of a linkage
 
 
 def begun(integrator: Integrator, because: str, want: Sequence[str], dt: float, suggested: bool) -> Stats:
