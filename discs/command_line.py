@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from discs.chains.stencils import ENDS
-from discs.files.archive import load, named, recorded, replacing
+from discs.files import exports, safe
+from discs.files.archive import load, recorded, replacing
 from discs.files.framefile import FrameFile
 from discs.files.safe import check_writable, fresh
 from discs.files.schema import describe
@@ -84,7 +85,11 @@ def add_loads(p: argparse.ArgumentParser) -> None:
 
 def add_saving(p: argparse.ArgumentParser) -> None:
     """Options for saving."""
-    p.add_argument("--save", metavar="FILE", help="NetCDF file for the run (default: not saved)")
+    p.add_argument(
+        "--save",
+        metavar="FILE",
+        help="file for the run: .nc (all of it, frame by frame), .csv, .glb (Blender) or .vtkhdf (ParaView) (default: not saved)",
+    )
     p.add_argument("--overwrite", action="store_true", help="replace FILE if there is another run in it (default: refuse)")
     p.add_argument("--quiet", action="store_true", help="no progress bars")
 
@@ -112,7 +117,8 @@ def add_file_commands(commands: "argparse._SubParsersAction[argparse.ArgumentPar
 def run_discs(problem: Problem, options: argparse.Namespace) -> None:
     """Run a problem with the given options and print a summary."""
     problem = replace(problem, loads=problem.loads + given_loads(options))
-    clear_way(options, whole=False)
+    streams = bool(options.save) and exports.check_kind(options.save) not in exports.KINDS
+    clear_way(options, whole=not streams)
     run = simulate(
         problem,
         options.method,
@@ -122,9 +128,11 @@ def run_discs(problem: Problem, options: argparse.Namespace) -> None:
         want=options.want,
         engine=options.engine,
         progress=not options.quiet,
-        checkpoint=options.save,
+        checkpoint=options.save if streams else None,
     )
     print(summary(run))
+    if options.save and not streams:
+        run.save(options.save)
     if options.save:
         print(f"written to {options.save}")
 
@@ -140,8 +148,11 @@ def clear_way(options: argparse.Namespace, whole: bool) -> None:
         raise ValueError("--overwrite goes with --save FILE")
     if not options.save:
         return
-    path = named(options.save)
+    kind = exports.check_kind(options.save)
+    path = safe.target(options.save)
     check_writable(path)
+    if kind in exports.KINDS and options.overwrite:
+        return  # what such a file holds is not known; the new one replaces it at the end
     if path.exists() and options.overwrite:
         with FrameFile.open(path):  # only a run is ever deleted
             pass

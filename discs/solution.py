@@ -17,6 +17,7 @@ from discs.running.stats import Stats
 from discs.running.step_error import doubts
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
     from matplotlib.axes import Axes
 
@@ -55,10 +56,27 @@ class Result:
         return view(self, path, beside, **style)
 
     def save(self, path: str | Path) -> None:
-        """Write it to a NetCDF-4 file, which `discs.load` reads; see docs/archives.md."""
-        from discs.files import archive
+        """Write it to a file of the kind that its name says; see docs/archives.md.
 
-        archive.save(self, path)
+        .nc (.nc4, .h5, .hdf5): all of it, for `discs.load` and xarray. .csv: a table, a row for each frame and disc. .glb: moving
+        discs for Blender and web pages (needs trimesh). .vtkhdf: moving discs for ParaView.
+
+        Raises
+        ------
+        ValueError : for another ending; if no file can be made there.
+        """
+        from discs.files import exports
+
+        exports.save(self, path)
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """A pandas table, a row for each frame and disc (of a mechanical system for each frame); units in `.attrs["units"]`.
+
+        What has one value a frame, as the energy, is repeated for each disc.
+        """
+        from discs.files import exports
+
+        return exports.to_dataframe(self)
 
     def to_xarray(self) -> "xarray.Dataset":
         """An xarray dataset with dimensions (time, disc) or (time, coordinate), units and long names."""

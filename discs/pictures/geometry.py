@@ -17,6 +17,7 @@ from discs.mechanics import Trajectory
 from discs.mechanics.bodies import Bodies
 from discs.solution import Solution
 
+MOST_FRAMES, MOST_POSES = 5000, 200_000  # of a run that is shown: frames, and frames times drawn discs
 TOO_FAR = 0.2  # of the drawn radius: largest error of a point of a rim between two frames
 
 
@@ -72,6 +73,22 @@ def picked(s: Float, about: int) -> Int:
 def instants(run: Solution, count: int) -> Int:
     """Indices of at most `count` frames, equally spaced with the first and the last."""
     return np.unique(np.linspace(0, run.t.size - 1, count).round().astype(int))
+
+
+def thinned(run: Solution, n: int) -> Solution:
+    """The run at the frames that pages and files with n drawn discs hold at most, equally spaced with the first and the last."""
+    return run[instants(run, max(2, min(MOST_FRAMES, MOST_POSES // n)))]
+
+
+def poses(run: Solution, radius: float) -> tuple[Float, Float]:
+    """Hubs (F, N, 3) of discs drawn with a radius, and their axes (F, N, 3, 3), columns: the axle d_1, d_3 x d_1, the spoke d_3."""
+    axle = np.moveaxis(axles(run), 1, 2)
+    flat = np.zeros((*axle.shape[:2], 1))
+    first = np.append(axle, flat, axis=2)
+    ahead = np.append(np.moveaxis(turn(np.moveaxis(axle, 2, 1)), 1, 2), flat, axis=2)
+    spoke = np.sin(run.theta)[..., None] * ahead + np.cos(run.theta)[..., None] * np.array([0.0, 0.0, 1.0])
+    hubs = np.stack([run.x, run.y, np.full(run.x.shape, radius)], axis=-1)
+    return hubs, np.stack([first, np.cross(spoke, first), spoke], axis=-1)
 
 
 def drawn_radius(run: Solution, radius: float | None) -> float:

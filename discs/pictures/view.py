@@ -28,7 +28,6 @@ from discs.pictures.style import BLUE, INK, LABEL, ORANGE, UNSIGNED
 from discs.solution import Result, Solution
 
 SAND = "#e8d59a"  # the middle of the scale of signed values: no white, which would look as if it had no colour
-MOST_FRAMES, MOST_POSES = 5000, 200_000  # of a run in a page: frames, and frames times drawn discs, of 32 bytes each
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +145,7 @@ def _data(run: Solution, title: str, about: int, size: float) -> dict[str, Any]:
             frame = int(np.argwhere(~np.isfinite(values))[0, 0])
             raise ValueError(f"a page needs finite values; {name} is not at frame {frame} of {title!r}: view the frames before it")
     shown, frames, drift = geometry.picked(run.s, about), run.t.size, float(np.abs(run.energy - run.energy[0]).max())
-    run = run[geometry.instants(run, max(2, min(MOST_FRAMES, MOST_POSES // shown.size)))]
+    run = geometry.thinned(run, shown.size)
     axle, slope = geometry.axles(run), geometry.slopes(run)
     arrays = {
         "x": run.x,
