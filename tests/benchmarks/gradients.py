@@ -1,7 +1,7 @@
 """`python -m tests.benchmarks.gradients`: gradients by the discrete adjoint, and by diffrax's checkpointed adjoint.
 
-The derivatives of the last y of the first disc by all initial angles, 128 discs of the paper's rod. Processor times after a first call,
-which compiles, and errors relative to the largest derivative, against "gauss8".
+The derivatives of the last y of the first disc by all initial angles, 128 discs of the paper's rod: processor times after a first
+call, which compiles, and errors relative to the largest derivative, against "gauss8".
 """
 
 import time as clock
