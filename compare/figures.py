@@ -219,12 +219,13 @@ OURS |= {"radau3": "#F0E442", "radau5": "#A0522D"}
 
 
 def precision(study: WorkPrecision) -> list[Axes]:
-    """Error against time, log-log, a row of panels for each problem: our methods in colour, peers in grey, each with
-    its mark."""
+    """Error against time, log-log, a row of panels for each problem: our methods with thick lines and dots, in front; peers with
+    thin dashed ones, each with its colour and mark."""
     names = list(dict.fromkeys(name for name, _ in study.problems))
     sizes = list(dict.fromkeys(n for _, n in study.problems))
     peers = list(dict.fromkeys(r.method for r in study.rows if not r.ours))
     marks = dict(zip(peers, ("s", "D", "^", "v", "<", ">", "p", "*", "h", "X", "P", "d", "8", "H", "1", "2"), strict=False))
+    shade = {peer: colormaps["tab20b"](i / max(1, len(peers) - 1)) for i, peer in enumerate(peers)}
     columns = len(sizes) if len(names) > 1 else min(len(sizes), 2)  # a single problem fills a page's width
     rows = -(-len(names) * len(sizes) // columns)
     figure = Figure(figsize=(1.5 + 3.3 * max(columns, 2), 1.8 + 3.4 * rows), layout="constrained")
@@ -239,7 +240,7 @@ def precision(study: WorkPrecision) -> list[Axes]:
                 line = ax.loglog(seconds, errors, "o-", color=OURS[method], markersize=4, linewidth=1.6, zorder=3)[0]
             else:
                 line = ax.loglog(
-                    seconds, errors, marks.get(method, "."), linestyle="-", color="#999999", markersize=4, linewidth=0.8
+                    seconds, errors, marks.get(method, "."), linestyle="--", color=shade[method], markersize=4, linewidth=0.8
                 )[0]
             shown.setdefault(method, line)
         ax.set_title(f"{LAW.get(name, name)}, N = {n}", fontsize="medium")

@@ -261,7 +261,7 @@ def _speed(page: Page, scene: Scene, n: int) -> None:
     found = work_precision({"paper's scene": scene}, (n,), speed_peers, repeats=3, seconds=1.0, progress=False)
     rows = [(r.method, r.setting, r.error, r.seconds, r.remark) for r in found.rows]
     page.add("## Speed against error", "`python -m compare precision` measures more sizes, laws and peers.", found.speedups())
-    caption = f"Our methods in colour, SciPy's and SUNDIALS' in grey, N = {n}."
+    caption = f"Our methods with thick lines, SciPy's and SUNDIALS' with dashed ones, N = {n}."
     page.figure("precision", found.plot()[0], caption, ("method", "setting", "error", "seconds", "remark"), rows)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,10 +11,11 @@ from matplotlib.figure import Figure
 
 from discs import checks
 from discs.chains.chain import SteeredChain
+from discs.files import schema
 from discs.mechanics import Trajectory
 from discs.mechanics.vakonomic import of_chain, rolling_disc, solve
 from discs.pictures import geometry, trajectories
-from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED
+from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED, UNSIGNED
 from discs.problem import Problem, State
 from discs.solution import Result, Solution
 
@@ -29,16 +31,18 @@ def first_look(run: Result, panels: Iterable[str] = (), ax: Axes | Iterable[Axes
     Parameters
     ----------
     panels : "motion" (from above), "theta" and "omega" over (s, t), "end" (the first disc against time), "profiles" (theta along
-        the rod), "energy" (its error). One disc has no theta, omega and profiles along s. Of a mechanical system: "coordinates",
-        "velocities", "multipliers", "energy" (its change, and works) against time, "above" (paths in the plane).
+        the rod), "energy" (its error). By name only: "phase" (omega against theta), and over (s, t) every quantity that the run
+        recorded for each disc, as "x" or "contact_force" (its size). One disc has nothing along s. Of a mechanical system:
+        "coordinates", "velocities", "multipliers", "energy" (its change, and works) against time, "above" (paths in the plane).
     ax : one axes for each panel, or None for a new figure.
 
     Raises
     ------
     ValueError : for an unknown panel, another number of axes, or a run of a single frame.
     """
-    every = _panels(run)
-    names = [checks.choice("panel", name, every) for name in panels] or list(every)
+    usual = _panels(run)
+    every = usual | _further(run)
+    names = [checks.choice("panel", name, every) for name in panels] or list(usual)
     if ax is None:
         columns = min(len(names), 3)
         rows = -(-len(names) // columns)
@@ -61,6 +65,37 @@ def _panels(run: Result) -> dict[str, Callable[[Axes], Axes]]:
         return {name: partial(draw, run) for name, draw in trajectories.panels(run).items()}
     one = run.discs
     return {name: partial(draw, one) for name, draw in PANELS.items() if one.s.size > 1 or name not in ALONG}
+
+
+def _further(run: Result) -> dict[str, Callable[[Axes], Axes]]:
+    """The panels that are drawn only if they are asked for."""
+    if isinstance(run, Trajectory):
+        return {}
+    one = run.discs
+    maps = {name: partial(spacetime, one, name) for name in _recorded(one) if name not in PANELS} if one.s.size > 1 else {}
+    return {"phase": partial(phase, one), **maps}
+
+
+def _recorded(run: Solution) -> list[str]:
+    """The quantities of each disc that a run recorded."""
+    return [name for name, of in schema.QUANTITIES.items() if of.dims[-1:] == ("disc",) and getattr(run, name) is not None]
+
+
+def phase(run: Solution, ax: Axes | None = None, discs: int = 3) -> Axes:
+    """The phase portrait: omega against theta of some discs, among them the first and the last; a dot is the end."""
+    ax = given_or_new(ax, 5.4, 4.4)
+    for i, colour in zip(
+        np.unique(np.linspace(0, run.s.size - 1, checks.whole("discs", discs, 1)).astype(int)),
+        cycle((BLUE, ORANGE, GREEN, PURPLE, GREY)),
+        strict=False,
+    ):
+        ax.plot(run.theta[:, i], run.omega[:, i], color=colour, label=f"disc at s = {run.s[i]:.3g}")
+        ax.plot(run.theta[-1, i], run.omega[-1, i], "o", color=colour, markersize=4)
+    ax.set_xlabel(LABEL["theta"])
+    ax.set_ylabel(LABEL["omega"])
+    ax.legend(fontsize=8)
+    ax.grid(alpha=0.3)
+    return ax
 
 
 def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int = 9, radius: float | None = None) -> Axes:
@@ -94,16 +129,22 @@ def motion(run: Solution, ax: Axes | None = None, instants: int = 5, discs: int 
 
 
 def spacetime(run: Solution, name: str = "omega", ax: Axes | None = None) -> Axes:
-    """theta or omega in colour over (s, t); contour lines, dashed below zero, remain readable without colour."""
+    """A quantity of each disc in colour over (s, t); contour lines, dashed below zero, remain readable without colour.
+
+    name : "theta", "omega" or any other that the run recorded; of "contact_force" its size.
+    """
     ax = given_or_new(ax, 5.4, 4.4)
-    values = getattr(run, checks.choice("name", name, ("theta", "omega")))
+    values = getattr(run, checks.choice("name", name, _recorded(run)))
+    size = values.ndim == 3
+    values = np.hypot(values[:, 0], values[:, 1]) if size else values
     reach = np.abs(values).max() or 1.0
-    colours = LinearSegmentedColormap.from_list("signed", SIGNED)
-    mesh = ax.pcolormesh(run.s, run.t, values, cmap=colours, vmin=-reach, vmax=reach, shading="gouraud", rasterized=True)
+    colours = LinearSegmentedColormap.from_list("colours", UNSIGNED if size else SIGNED)
+    low = 0.0 if size else -reach
+    mesh = ax.pcolormesh(run.s, run.t, values, cmap=colours, vmin=low, vmax=reach, shading="gouraud", rasterized=True)
     if np.ptp(values) > 1e-9 * reach:
         ax.contour(run.s, run.t, values, levels=9, colors=INK, linewidths=0.5)
     bar = ax.figure.colorbar(mesh, ax=ax)
-    bar.set_label(LABEL[name])
+    bar.set_label(LABEL.get("force" if size else name, f"{name} ({schema.QUANTITIES[name].units})"))
     ax.set_xlabel(LABEL["s"])
     ax.set_ylabel(LABEL["t"])
     return ax

@@ -115,6 +115,16 @@ def test_spacetime_is_what_was_simulated():
     assert mesh.cmap(0.5)[:3] == pytest.approx((0.97, 0.97, 0.97), abs=0.01)
 
 
+def test_any_quantity_over_place_and_time():
+    run = run_of(want=("contact_force", "velocity"))
+    force, rate, phase = run.plot("contact_force", "x_rate", "phase")
+    size = np.hypot(run.contact_force[:, 0], run.contact_force[:, 1])
+    np.testing.assert_array_equal(np.ravel(force.collections[0].get_array()), size.ravel())
+    assert force.collections[0].norm.vmin == 0
+    np.testing.assert_array_equal(np.ravel(rate.collections[0].get_array()), run.x_rate.ravel())
+    np.testing.assert_array_equal(phase.lines[-2].get_xydata(), np.stack([run.theta[:, -1], run.omega[:, -1]], axis=1))
+
+
 def test_energy_is_relative_to_the_start():
     run = run_of()
     (line,) = figures.energy_error(run).lines
@@ -126,10 +136,13 @@ def test_energy_is_relative_to_the_start():
     [
         (
             lambda run: run.plot("speed"),
-            "panel must be one of 'motion', 'theta', 'omega', 'end', 'profiles', 'energy'; got 'speed'",
+            "panel must be one of 'motion', 'theta', 'omega', 'end', 'profiles', 'energy', 'phase', 'x', .*; got 'speed'",
         ),
         (lambda run: run.plot("end", "energy", ax=Figure().subplots()), "one axes for each of the 2 panels; got 1"),
-        (lambda run: figures.spacetime(run, "x"), "name must be one of 'theta', 'omega'; got 'x'"),
+        (
+            lambda run: figures.spacetime(run, "contact_force"),
+            "name must be one of 'x', 'y', 'theta', 'omega'; got 'contact_force'",
+        ),
         (lambda run: run.plot_motion(instants=0), "instants must be a whole number of at least 1; got 0"),
         (lambda run: run.plot_motion(radius=-1), "radius must be a positive finite number; got -1"),
     ],

@@ -122,7 +122,7 @@ def test_how_far_lines_between_frames_are_off():
 def test_one_disc_from_above():
     assert single().plot_motion() is not None
     assert len(single().plot()) == 3
-    with pytest.raises(ValueError, match="panel must be one of 'motion', 'end', 'energy'; got 'theta'"):
+    with pytest.raises(ValueError, match="panel must be one of 'motion', 'end', 'energy', 'phase'; got 'theta'"):
         single().plot("theta")
     assert geometry.drawn_radius(single(), None) == 0.7
     assert geometry.drawn_radius(pair(), None) == pytest.approx(1 / 3)
