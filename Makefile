@@ -1,10 +1,12 @@
 # make run: the main job, results in out/.   make test: the suite, as in CI.   make long: every test.   All make .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
-INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python
+INSTALL := $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python
 # one thread for linear algebra: the matrices are small, threads only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+# modules are kept compiled: otherwise each process compiles a thousand of them, which takes longer than many runs
+unexport PYTHONDONTWRITEBYTECODE
 # no advertisement of another tool in the middle of `make docs`
 export NO_MKDOCS_2_WARNING := 1
 # what touches every dependency, in some minutes, most of them for compiling with the oldest numba

@@ -45,10 +45,10 @@ def _own(problem: Problem) -> list[Peer]:
 
 
 def _others(problem: Problem) -> list[Peer]:
-    """SciPy's methods, with tolerances from loose to tight and a right-hand side compiled for this chain, which takes seconds."""
+    """SciPy's methods, with tolerances from loose to tight and a right-hand side compiled for this chain."""
     loosest, tightest = TOLERANCES
     return [
         peer._replace(settings=tuple(setting for setting in peer.settings if tightest <= setting <= loosest))
-        for peer in reduced.scipy_peers(problem, reduced.Bound(problem))
+        for peer in reduced.scipy_peers(problem, reduced.Bound(problem, keep=True))
         if peer.name in OTHERS
     ]

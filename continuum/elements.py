@@ -30,6 +30,7 @@ import scipy  # its parts, slow to import, when they are used
 from continuum.element_grid import Grid
 from continuum.element_loads import ElementLoads, breaks
 from continuum.element_march import march
+from continuum.element_rates import rates
 from continuum.initial import resolve
 from continuum.parameters import Section, sample
 from continuum.pieces import POINTS
@@ -99,6 +100,11 @@ class Elements:
         return np.stack([np.broadcast_to(values, shape) for values in found])
 
     @cached_property
+    def radius(self) -> Float:
+        """At the nodes, (n,)."""
+        return np.broadcast_to(np.asarray(self._at_nodes.radius, dtype=float), self.n).copy()
+
+    @cached_property
     def loads(self) -> ElementLoads | None:
         """The loads of the scene; None for none."""
         if not self.scene.loads:
@@ -131,7 +137,7 @@ class Elements:
     def spins(self, t: float, q: Float) -> tuple[Float, Float]:
         """omega. at the nodes (n,) at a time, and the torques about the axles of motors at the two ends (2,)."""
         loads, reaction = self.loads, np.zeros(2)
-        torque, inertia = self._torques(q, NONE if loads is None else loads.values(t))[0][0], self._inertia[0]
+        torque, inertia = self._torques(q, NONE if loads is None else loads.values(t))[0][0], self.inertia[0]
         spin: Float = torque / inertia
         if loads is not None and loads.motors.axles:
             for row, node, change in zip(*loads.driven, loads.motors.changes(np.array([t]))[0], strict=True):
@@ -150,7 +156,7 @@ class Elements:
         local = -(w * flux / self.grid.half) @ self.grid.d.T
         local[3] += w * (u[0] * n2 - u[1] * n1)
         force = self.grid.sum(local)
-        e = self._at_nodes.radius * np.stack([-np.sin(q[3]), np.cos(q[3])])
+        e = self.radius * np.stack([-np.sin(q[3]), np.cos(q[3])])
         if loads is not None:
             force += loads.force(values, q, e)
         return np.stack([e[0] * force[0] + e[1] * force[1] + force[2], force[3]]), e, bent
@@ -165,7 +171,7 @@ class Elements:
         out = np.empty_like(q)
         out[:2] = e * q[4]
         out[2:4] = q[4:]
-        out[4:] = torque / self._inertia
+        out[4:] = torque / self.inertia
         if loads is None:
             return out.ravel()
         out[4:][loads.driven] = 0.0  # `held` sets these rates
@@ -183,7 +189,7 @@ class Elements:
 
         def driven(now: Float, z: Float) -> float:
             """Energy that depends on time, and that of discs that motors drive."""
-            kinetic = 0.5 * self._inertia[loads.driven] @ z[4:][loads.driven] ** 2
+            kinetic = 0.5 * self.inertia[loads.driven] @ z[4:][loads.driven] ** 2
             return self.energy(z, loads.at_rest(now)) - self.energy(z, loads.rest) + float(kinetic)
 
         gained = np.array([driven(*pair) for pair in zip(values, q, strict=True)]) - driven(loads.values(0.0), self.start)
@@ -191,10 +197,10 @@ class Elements:
         if not loads.motors.axles:
             return balance, None
         torques = [self._torques(z, now)[0][loads.driven] for now, z in zip(values, q, strict=True)]
-        return balance, loads.motors.changes(times) * self._inertia[loads.driven] - np.array(torques)
+        return balance, loads.motors.changes(times) * self.inertia[loads.driven] - np.array(torques)
 
     @cached_property
-    def _inertia(self) -> Float:
+    def inertia(self) -> Float:
         """Of rolling and turning at the nodes, (2, n)."""
         return np.stack([self._at_nodes.inertia * self.grid.weights, self._at_nodes.heading_inertia * self.grid.weights])
 
@@ -227,9 +233,9 @@ class Elements:
         loads, start, size = self.loads, self.start.ravel(), 6 * self.n
         what = f"{self.grid.count} elements"
         if loads is None:
-            q = march(self.rate, start, times, np.zeros(1), tol, what).reshape(-1, 6, self.n)
+            q = march(rates(self), start, times, np.zeros(1), tol, what).reshape(-1, 6, self.n)
             return Course(q, np.array([self.energy(z) for z in q]))
-        fastest = loads.fastest(self._inertia, float(np.max(self._at_nodes.radius)))
+        fastest = loads.fastest(self.inertia, float(np.max(self._at_nodes.radius)))
         # explicit steps are below 5/fastest; the number of implicit ones, which cost more, grows like tol^(-1/5)
         pattern = self._pattern if fastest * times[-1] > STIFF * tol**-0.2 else None
         found = march(self.rate, np.append(start, [0.0, 0.0]), times, loads.timing.edges, tol, what, pattern)

@@ -18,10 +18,11 @@ from discs.arrays import Float
 from discs.integrators.ivp import Reduced
 
 
-def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
+def bound(problem: Problem, y: Float, keep: bool = False) -> Callable[[float, Float, Float], None]:
     """f(t, y, out), compiled for one chain, whose parameters become constants of the code; without a compiled form, in NumPy.
 
-    Compiled once, for arrays like y that must not change, as SUNDIALS hands them over; SciPy's are taken as such.
+    Compiled once, for arrays like y that must not change, as SUNDIALS hands them over; SciPy's are taken as such. keep : on disc,
+    see `compare.peers.held`; without loads.
     """
     if problem.system.parameters is None:
         plain = Reduced(problem.system)
@@ -42,6 +43,10 @@ def bound(problem: Problem, y: Float) -> Callable[[float, Float, Float], None]:
         def f(t, y, out):  # type: ignore[no-untyped-def]
             inner(at(t), t, y, out)
 
+    elif keep:
+        from compare.peers.held import held
+
+        f = held(chain)
     else:
 
         @jit
@@ -68,9 +73,16 @@ class Bound:
     ----------
     f : (t, y, out), None compiles one for the chain, which takes seconds and makes calls a third faster.
     by_rate : the unknowns are omega instead of pi, see `compare.peers.rates`.
+    keep : keep the compiled right-hand side on disc.
     """
 
-    def __init__(self, problem: Problem, f: Callable[[float, Float, Float], None] | None = None, by_rate: bool = False) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        f: Callable[[float, Float, Float], None] | None = None,
+        by_rate: bool = False,
+        keep: bool = False,
+    ) -> None:
         self.calls, self.until, self.by_rate = 0, np.inf, by_rate
         self.reduced = Reduced(problem.system)
         z = problem.start()
@@ -79,7 +91,7 @@ class Bound:
         # pi of a disc scales like the root of its share of the length, and so do the allowed errors
         share = np.ones_like(mass) if by_rate else np.sqrt(np.where(spin > 0, spin, mass))
         self.unit = self.reduced.join(np.ones_like(z.hi), np.ones_like(z.pi) * share)
-        self.f = f or (rates.bound if by_rate else bound)(problem, read_only(self.y0) if by_rate else self.y0)
+        self.f = f or (rates.bound(problem, read_only(self.y0)) if by_rate else bound(problem, self.y0, keep))
         self(0.0, self.y0)  # compiled before anything is timed
 
     def start(self, seconds: float) -> None:

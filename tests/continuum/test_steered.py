@@ -9,6 +9,7 @@ from compare import convergence, lump
 from continuum import SteeredRod, solve, steered_rod, untwisting_rod
 from continuum.dispersion import steered_frequencies
 from continuum.element_grid import DEGREE, lobatto
+from continuum.element_rates import compiled
 from continuum.elements import Elements
 from continuum.mesh import semidiscretise
 from continuum.scenes import PAPER
@@ -32,6 +33,17 @@ def test_lobatto_rule_is_exact_on_polynomials():
         exact = 2 / (degree + 1) if degree % 2 == 0 else 0.0
         assert w @ x**degree == pytest.approx(exact, abs=1e-14)
     np.testing.assert_allclose(d @ x**7, 7 * x**6, atol=1e-12)
+
+
+@pytest.mark.parametrize("turns", [0, 1])
+def test_compiled_rates_are_the_plain_ones(turns):
+    """Rods that vary, with free ends and closed, where the line and its heading turn once."""
+    scene = steered_rod(14.0, 5.0, 0.6, twist=0.8, **UNEVEN)
+    rod = replace(scene.rod, radius=lambda s: 1 + 0.3 * np.cos(2 * np.pi * s / 3.1), shear_stiffness=lambda s: 5 + s * (3.1 - s))
+    elements = Elements(replace(scene, rod=rod, closed=bool(turns), turns=turns, shift=(0.4, -0.2) if turns else (0.0, 0.0)), 3)
+    y = elements.start.ravel() + 0.1 * np.random.default_rng(1).standard_normal(6 * elements.n)
+    plain = elements.rate(0.0, y)
+    np.testing.assert_allclose(compiled(elements)(0.0, y), plain, rtol=1e-13, atol=1e-13 * np.abs(plain).max())
 
 
 def test_field_reaches_its_tolerance(accurate):
