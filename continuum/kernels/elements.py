@@ -1,4 +1,4 @@
-"""The rates of a steered rod on elements, compiled; the plain twin is `continuum.elements.Elements.rate`, where the formulas are."""
+"""The rates of a steered rod on elements, compiled; the plain twin, with the formulas, is `continuum.elements.Elements.rate`."""
 
 import numpy as np
 
