@@ -1,24 +1,16 @@
 """Which rates a motion of elements takes: the compiled ones, or the plain ones while they are compiled."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from continuum.element_grid import Grid
 from discs import checks
 from discs.arrays import Float
 from discs.kernels.background import Kernels, usual
 from discs.running.engine import ENGINES
 
-if TYPE_CHECKING:
-    from continuum.elements import Elements
-
 _THERE: list[bool] = []  # not empty if the kernel is there
-
-
-def rates(elements: "Elements") -> Callable[[float, Float], Float]:
-    """The time derivative of the unknowns of elements without loads, (6 n,), at a time and (6 n,)."""
-    return compiled(elements) if ready() else elements.rate
 
 
 def ready() -> bool:
@@ -37,15 +29,11 @@ def load() -> None:
     rates(np.zeros(12), one[:1], two[:1], two, np.ones((4, 1, 2)), one, two, np.zeros(4), np.empty(12))
 
 
-def compiled(elements: "Elements") -> Callable[[float, Float], Float]:
-    """The compiled rates of elements without loads."""
+def compiled(grid: Grid, stiffness: Float, radius: Float, inertia: Float, closing: Float) -> Callable[[float, Float], Float]:
+    """The rates (6 n,) of elements without loads, at a time and unknowns (6 n,); the parameters are those of the kernel."""
     from continuum.kernels.elements import rates
 
-    grid, scene = elements.grid, elements.scene
-    closing = np.array([*(scene.shift if scene.closed else (0.0, 0.0)), 0.0, 2 * np.pi * (scene.turns if scene.closed else 0)])
-    half, w, d = np.ascontiguousarray(grid.half[:, 0]), np.ascontiguousarray(grid.w), grid.d
-    stiffness, inertia = np.ascontiguousarray(elements.stiffness), np.ascontiguousarray(elements.inertia)
-    radius = elements.radius
+    half, w, d = grid.half[:, 0].copy(), np.ascontiguousarray(grid.w), grid.d
 
     def rate(t: float, y: Float) -> Float:
         out = np.empty_like(y)

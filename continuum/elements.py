@@ -20,6 +20,7 @@ where damping is stiff, with an error far below that of the elements. Loads: see
 The method is independent of the chain of discs: it shares only the equations.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -30,7 +31,7 @@ import scipy  # its parts, slow to import, when they are used
 from continuum.element_grid import Grid
 from continuum.element_loads import ElementLoads, breaks
 from continuum.element_march import march
-from continuum.element_rates import rates
+from continuum.element_rates import compiled, ready
 from continuum.initial import resolve
 from continuum.parameters import Section, sample
 from continuum.pieces import POINTS
@@ -179,6 +180,12 @@ class Elements:
         power[0] -= torque[loads.driven] @ q[4:][loads.driven]
         return np.concatenate([out.ravel(), power])
 
+    @cached_property
+    def compiled(self) -> Callable[[float, Float], Float]:
+        """The compiled twin of `rate`, without loads."""
+        closing = np.array([*self.scene.shift, 0.0, 2 * np.pi * self.scene.turns]) if self.scene.closed else np.zeros(4)
+        return compiled(self.grid, self.stiffness, self.radius, self.inertia, closing)
+
     def _balance(self, times: Float, q: Float, values: Float, spent: Float) -> tuple[Float, Float | None]:
         """Work and dissipation (F, 2), and torques of motors (F, motors), of a motion (F, 6, n) with signals (F, L + motors + 1).
 
@@ -233,7 +240,7 @@ class Elements:
         loads, start, size = self.loads, self.start.ravel(), 6 * self.n
         what = f"{self.grid.count} elements"
         if loads is None:
-            q = march(rates(self), start, times, np.zeros(1), tol, what).reshape(-1, 6, self.n)
+            q = march(self.compiled if ready() else self.rate, start, times, np.zeros(1), tol, what).reshape(-1, 6, self.n)
             return Course(q, np.array([self.energy(z) for z in q]))
         fastest = loads.fastest(self.inertia, float(np.max(self._at_nodes.radius)))
         # explicit steps are below 5/fastest; the number of implicit ones, which cost more, grows like tol^(-1/5)

@@ -9,7 +9,6 @@ from compare import convergence, lump
 from continuum import SteeredRod, solve, steered_rod, untwisting_rod
 from continuum.dispersion import steered_frequencies
 from continuum.element_grid import DEGREE, lobatto
-from continuum.element_rates import compiled
 from continuum.elements import Elements
 from continuum.mesh import semidiscretise
 from continuum.scenes import PAPER
@@ -43,7 +42,7 @@ def test_compiled_rates_are_the_plain_ones(turns):
     elements = Elements(replace(scene, rod=rod, closed=bool(turns), turns=turns, shift=(0.4, -0.2) if turns else (0.0, 0.0)), 3)
     y = elements.start.ravel() + 0.1 * np.random.default_rng(1).standard_normal(6 * elements.n)
     plain = elements.rate(0.0, y)
-    np.testing.assert_allclose(compiled(elements)(0.0, y), plain, rtol=1e-13, atol=1e-13 * np.abs(plain).max())
+    np.testing.assert_allclose(elements.compiled(0.0, y), plain, rtol=1e-13, atol=1e-13 * np.abs(plain).max())
 
 
 def test_field_reaches_its_tolerance(accurate):
