@@ -1,5 +1,7 @@
 """Linkages against other models of ours, textbooks' equations with multipliers, exact motions, and their own balances."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from discs import (
 )
 from discs.linkage import nearest
 from discs.linkage.midpoint import Moment, Stepper
+from discs.linkage.starting import response
 from discs.loads import Rest
 
 ROWS = ("x", "y", "theta", "phi", "omega", "phi_rate", "energy")
@@ -100,6 +103,13 @@ def test_rigid_links_and_free_nodes_obey_lagrange_and_dalembert():
     ]
     exact = book.integrate(q, book.consistent_velocity(np.array(q), np.array(v), 0.0), runs[0].t, progress=False)
     assert np.allclose(exact.v[0], v, atol=1e-12)
+    freely = replace(book, applied=None).accelerations(np.array(q), np.array(v)).acceleration
+    across, cos, sin = -v[6] * radius * v[5], np.cos(q[5]), np.sin(q[5])
+    still = replace(linkage, rolling_drag=0.0)
+    change = response(LinkageProblem(still, begin, 3.0).equations, *problem.start(), 0.0)[0]
+    u = change[0, 1]
+    found = [*change[:, 0], across * cos - u * sin, across * sin + u * cos, change[2, 1], u / radius]
+    assert np.allclose(found, freely, rtol=0, atol=1e-11)
     off = []
     for run in runs:
         found = np.stack(

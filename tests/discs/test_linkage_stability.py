@@ -108,6 +108,24 @@ def test_elastic_hinges_off_the_disc_flutter():
     assert modes(LinkageProblem(rigid, towed, 5.0), 3).growth < 1e-6
 
 
+def test_a_trailer_on_a_circle_returns_to_it():
+    """In axes that turn with the head: beta' = Omega - (u/k) sin beta at the hinge, with u(beta) of the energy; displacements."""
+    radius, k, turn = 1.3, 0.5, 0.6
+    behind = np.sqrt(radius**2 - k**2)
+    speed, angle = radius * turn, np.array([0.3, 0.3 - np.arctan2(k, behind)])
+    x, y = np.array([radius, behind]) * [np.cos(angle), np.sin(angle)]
+    mass, inertia = [0.8, 1.4], [0.2, 0.3]
+    linkage = Linkage(
+        n=2, link_length=k, mass=mass, heading_inertia=inertia, bending_stiffness=0, mounting_angle=np.pi / 2, second_share=1.0
+    )
+    problem = LinkageProblem(linkage, LinkageState(x, y, angle, 0, -turn * y, turn * x, turn), 5.0)
+    found = modes(problem, 3).rate
+    sin, cos = k / radius, behind / radius
+    moved = mass[0] + mass[1] * cos**2 + inertia[1] * sin**2 / k**2  # the energy is moved u^2/2 and that of the head's turning
+    exact = [1j * turn, -1j * turn, speed * cos / k * (sin**2 * (inertia[1] / k**2 - mass[1]) / moved - 1)]
+    assert np.allclose(np.sort_complex(found), np.sort_complex(exact), atol=1e-7)
+
+
 def test_small_motions_are_about_steady_motions():
     flutter = LinkageProblem(column(2.1), bent(0.1, 0.2), 10.0)
     with pytest.raises(ValueError, match="small motions are about an equilibrium or a steady motion; in the state given"):
