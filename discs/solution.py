@@ -55,6 +55,12 @@ class Result:
 
         return view(self, path, beside, **style)
 
+    def _repr_html_(self) -> str:
+        """A small picture and a table, which notebooks show."""
+        from discs.pictures import summary
+
+        return summary.as_html(self)
+
     def save(self, path: str | Path) -> None:
         """Write it to a file of the kind that its name says; see docs/archives.md.
 

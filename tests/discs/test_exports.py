@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -51,6 +52,16 @@ def test_a_table_of_a_mechanical_system():
     frame = path.to_dataframe()
     assert list(frame.columns) == ["t", *path.names, *(f"{name}_rate" for name in path.names), "energy"]
     np.testing.assert_array_equal(frame[path.names[2]], path.q[:, 2])
+
+
+def test_what_a_notebook_shows(run):
+    shown = replace(run, stats=run.stats | {"method": "<b>"})._repr_html_()
+    assert "data:image/png;base64," in shown
+    assert "6 discs, 5 frames, t = 0 to 1" in shown
+    assert "&lt;b&gt;" in shown
+    assert "<img" not in run[:1]._repr_html_()
+    book = textbook.rolling_disc(1.3, 0.6, 0.4, radius=0.7, roll_rate=1.1, turn_rate=0.8, slope=2.1)
+    assert "4 coordinates" in book.integrate([0.0, 0.5, 1.0])._repr_html_()
 
 
 def test_bodies_for_paraview(run, tmp_path):
