@@ -167,8 +167,9 @@ class SlavedSystem(RollingDiscs):
     @cached_property
     def lanes(self) -> Parameters:
         """The same parameters in lanes (`discs.kernels.slaved_lanes`), for methods that take them; None for few or very many."""
-        if self.load is not None or not isinstance(self._springs, LinearCurvature) or self.parameters is None:
+        if not isinstance(self._springs, LinearCurvature) or self.parameters is None:
             return None
-        from discs.kernels import slaved_lanes, slaved_stages  # noqa: F401, and the sweeps
+        from discs.kernels import lanes, slaved_lanes, slaved_stages  # noqa: F401, and the sweeps
 
-        return slaved_lanes.arranged(self.parameters) if slaved_lanes.MANY <= self.n <= slaved_lanes.MOST else None
+        fit = slaved_lanes.MANY <= self.n <= slaved_lanes.MOST and lanes.local(self.parameters.load)
+        return slaved_lanes.arranged(self.parameters) if fit else None

@@ -261,8 +261,9 @@ class SteeredSystem(RollingDiscs):
     @cached_property
     def lanes(self) -> Parameters:
         """The same parameters in lanes (`discs.kernels.steered_lanes`), for methods that take them; None for few or very many."""
-        if self.load is not None or self._degree != 1:
+        if self._degree != 1 or self.parameters is None:
             return None
-        from discs.kernels import steered_lanes, steered_passes  # noqa: F401, the sweeps
+        from discs.kernels import lanes, steered_lanes, steered_passes  # noqa: F401, the sweeps
 
-        return steered_lanes.arranged(self.parameters) if steered_lanes.MANY <= self.n <= steered_lanes.MOST else None
+        fit = steered_lanes.MANY <= self.n <= steered_lanes.MOST and lanes.local(self.parameters.load)
+        return steered_lanes.arranged(self.parameters) if fit else None

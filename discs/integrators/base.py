@@ -135,7 +135,11 @@ class FixedStep(Integrator):
     @final
     def twin_of(self, system: RollingDiscs, chain: Parameters) -> Parameters:
         """What the compiled twin is given for `system.parameters`: those in lanes, if it takes them and there are."""
-        return chain if not self.in_lanes or system.lanes is None else system.lanes
+        lanes = system.lanes if self.in_lanes else None
+        if lanes is None:
+            return chain
+        timed = chain.load
+        return lanes._replace(load=lanes.load._replace(times=timed.times, values=timed.values, near=timed.near, spent=timed.spent))
 
     @final
     def march(

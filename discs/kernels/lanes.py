@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from discs.kernels import blocks, orders
 from discs.kernels.compiled import fill, part
+from discs.kernels.load import Linear
 from discs.kernels.shared import disc_by_disc
 from discs.kernels.steered_matrix import border, solve_border
 from discs.kernels.vectors import LANES, after, before, largest, load, store, total, zero
@@ -70,6 +71,23 @@ def order(n: int) -> Order:
     j, inner = np.arange(first, n + first), np.ones(LANES)
     inner[0] = 0.0
     return Order(n, rows, first, j % rows * LANES + j // rows, inner)
+
+
+def local(load):
+    """Whether a compiled load acts on each disc by itself, so that it can be put in lanes."""
+    return type(load) is Linear and load.viscosity.size == load.bends.rest.size == load.axles.size == 0
+
+
+def loaded(order, load):
+    """The parameters of a load that is `local`, in lanes: arrays (..., n')."""
+
+    def put(values):
+        to = np.zeros((*values.shape[:-1], LANES * order.rows * (values.size > 0)))
+        if values.size > 0:
+            to[..., order.places] = values
+        return to
+
+    return load._replace(**{name: put(getattr(load, name)) for name in ("constant", "damping", "stiffness", "patterns")})
 
 
 # Forms of `discs.kernels.protocol` for chains in this order

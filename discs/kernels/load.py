@@ -83,11 +83,11 @@ def _push(load, state, t, move, c, p, factor, g):
         constant, damping, stiffness = load.constant[row], load.damping[row], load.stiffness[row]
         hi, lo, step = state.hi[row], state.lo[row], move[row]
         if load.level[row] > 2:
-            for i in range(a.size):
+            for i in range(to.size):
                 f = constant[i] - damping[i] * (a[i] * rate[i]) - stiffness[i] * (hi[i] + (lo[i] + step[i]))
                 to[i] += factor * a[i] * f
         elif load.level[row] > 0:
-            for i in range(a.size):
+            for i in range(to.size):
                 to[i] += factor * a[i] * (constant[i] - damping[i] * (a[i] * rate[i]))
     for row in range(load.viscosity.shape[0]):
         a, rate, links, to = c[2 + row], p[row], load.viscosity[row], g[row]
@@ -107,7 +107,7 @@ def _push(load, state, t, move, c, p, factor, g):
             signal = factor * load.values[place, k] if place >= 0 else np.nan
             for row in range(c.shape[0]):
                 a, pattern, to = c[row], load.patterns[k, row], g[column(row)]
-                for i in range(a.size if load.pushed[k, row] else 0):
+                for i in range(to.size if load.pushed[k, row] else 0):
                     to[i] += signal * a[i] * pattern[i]
 
 
@@ -125,7 +125,7 @@ def _guide(load, c, d, g, roll, roll_beside, turn, turn_beside):
     for row in range(load.constant.shape[0]):
         a, damping, stiffness = c[row], load.damping[row], load.stiffness[row]
         to = turn if column(row) else roll
-        for i in range(a.size if load.level[row] > 1 else 0):
+        for i in range(damping.size if load.level[row] > 1 else 0):
             to[i] += a[i] * a[i] * (d * damping[i] + g * stiffness[i])
     for row in range(load.viscosity.shape[0]):
         a, links = c[2 + row], load.viscosity[row]

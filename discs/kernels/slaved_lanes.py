@@ -120,20 +120,21 @@ def arranged(chain: Slaved) -> Laned:
         np.full(LANES, 0.5 / chain.k),
         chain.ends,
         chain.rolling,
-        chain.load,
+        lanes.loaded(own, chain.load),
     )
 
 
 class Workspace(NamedTuple):
     """Workspace, (3, n' + 2 HALO): base, links of the base position; links, of a moved one; half, half a step. c : (3, n' + HALO).
 
-    b : (1, n'). spare : (LANES,). matrix : one of `orders.matrices`.
+    step : (3, n'), for loads. b : (1, n'). spare : (LANES,). matrix : one of `orders.matrices`.
     """
 
     base: NDArray
     links: NDArray
     half: NDArray
     c: NDArray
+    step: NDArray
     b: NDArray
     spare: NDArray
     matrix: Any
@@ -143,7 +144,8 @@ class Workspace(NamedTuple):
 def _workspace(chain):
     n = chain.radius.size
     base, links, half = np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO)), np.zeros((3, n + 2 * HALO))
-    return Workspace(base, links, half, np.zeros((3, n + HALO)), np.zeros((1, n)), np.empty(LANES), matrices(chain.order, 1.0, 1))
+    c, step, b = np.zeros((3, n + HALO)), np.zeros((3, n * do.loaded(chain.load))), np.zeros((1, n))
+    return Workspace(base, links, half, c, step, b, np.empty(LANES), matrices(chain.order, 1.0, 1))
 
 
 @fill(do.factors, *LANED, _nrt=True)
@@ -209,7 +211,7 @@ def moved(chain, base, move, d):
 
 @fill(do.spend, *LANED)
 def _spend(chain, state, t, weight, move, v, scale):
-    pass  # there are no loads
+    do.spend(chain.load, state, t, weight, move, v, scale)
 
 
 @fill(do.vanishing, *LANED)

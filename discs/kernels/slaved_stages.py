@@ -52,6 +52,10 @@ def _refine(chain, work, method, room, before, h, sweep):
         for axis in range(3):
             mix(a[k], h, fresh, axis, work.half[axis], HALO)
         pulled(chain, work, own.c[k], force[k, 0])
+        if do.loaded(chain.load):
+            for axis in range(3):
+                mix(a[k], h, fresh, axis, work.step[axis], 0)
+            do.push(chain.load, before, room.times[k], work.step, own.c[k], p[k], -1.0, force[k])
     for k in range(stages):
         w, x, q, to = four(a[k], -h), rows(force, 0), p[k, 0], room.rest[k, 0]
         for i in range(0, n, LANES):
@@ -62,7 +66,11 @@ def _refine(chain, work, method, room, before, h, sweep):
 
 @fill(do.finish, *LANED)
 def _finish(chain, work, method, room, before, h):
-    pass  # there are no loads
+    rule, moves, v = method.tableau, room.moves, room.v
+    for k in range(rule.b.size if chain.load.spent.size > 0 else 0):
+        for axis in range(3):
+            mix(rule.a[k], h, v, axis, moves[k, axis], 0)
+        do.spend(chain.load, before, room.times[k], h * rule.b[k], moves[k], v[k], 1.0)
 
 
 @part

@@ -10,7 +10,7 @@ from discs.kernels.abreast import END
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO, Order
 from discs.kernels.orders import bend_ends, corners, factor, join, pick, present, pull_ends, record, solve, wrap
-from discs.kernels.shared import reach
+from discs.kernels.shared import forward, reach
 from discs.kernels.slaved_lanes import LANED, moved
 from discs.kernels.slaved_matrix import GHOST, RING
 from discs.kernels.vectors import LANES, larger, largest, load, store, zero
@@ -162,8 +162,12 @@ def _sweep(chain, work, state, t, h, p, move, first):
     pulled(chain, work, c, b)
     for i in range(0, b.size, LANES):
         store(b, i, load(start, i) - load(q, i) - half * load(b, i))
+    if do.loaded(chain.load):
+        forward(c, p, work.step, half)
+        do.push(chain.load, state, t + half, work.step, c, p, half, work.b)
     matrix = pick(work.matrix, 0)
     assemble(chain, c, 1.0, half * half, matrix)
+    do.guide(chain.load, c, half, half * half, matrix.a, matrix.u, matrix.a, matrix.u)
     factor(chain.order, chain.ends == RING, chain.ends == GHOST, matrix)
     solve(chain.order, chain.ends == RING, chain.ends == GHOST, matrix, b)
     cx, cy, ct, x, y, theta = c[0], c[1], c[2], move[0], move[1], move[2]
@@ -205,6 +209,7 @@ def _pullback(chain, work, state, t, move, c, p, g):
         for i in range(0, x.size, LANES):
             store(to, HALO + i, load(x, i))
     pulled(chain, work, c, g[0])
+    do.push(chain.load, state, t, move, c, p, -1.0, g)
 
 
 @fill(do.stiffness, *LANED)
@@ -223,6 +228,7 @@ def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
         matrix.w[i] = g * stiff.w[i]
     for i in range(stiff.corner.size):
         matrix.corner[i] = g * stiff.corner[i]
+    do.guide(chain.load, c, d, g, matrix.a, matrix.u, matrix.a, matrix.u)
     factor(chain.order, chain.ends == RING, chain.ends == GHOST, matrix)
 
 

@@ -80,7 +80,7 @@ def arranged(chain: Steered) -> Turning:
 
     length, per = np.full(LANES, chain.scale[0]), np.full(LANES, 1 / chain.k)
     parts = put(chain.weights), put(chain.paces), put(scaled(chain), HALO)
-    return Turning(own, *parts, chain.scale, length, chain.shift, per, chain.ring, chain.load)
+    return Turning(own, *parts, chain.scale, length, chain.shift, per, chain.ring, lanes.loaded(own, chain.load))
 
 
 def scaled(chain: Steered) -> NDArray:
@@ -93,7 +93,7 @@ class Workspace(NamedTuple):
     (2, n' + 2 HALO), cosine and sine of the mean headings of links, their stretch and shear.
 
     heading : (2, n'), cosine and sine. section : (4, n' + LANES), `along` and `across` of links, see `discs.kernels.steered`.
-    c : (4, n' + HALO). b : (2, n'). spare : (LANES,).
+    c : (4, n' + HALO). step : (4, n'), for loads. b : (2, n'). spare : (LANES,).
     """
 
     base: NDArray
@@ -103,6 +103,7 @@ class Workspace(NamedTuple):
     heading: NDArray
     section: NDArray
     c: NDArray
+    step: NDArray
     b: NDArray
     spare: NDArray
     matrix: Any
@@ -114,8 +115,9 @@ def _workspace(chain):
     base, half = np.zeros((4, n + 2 * HALO)), np.zeros((4, n + 2 * HALO))
     middle, strain, heading = np.zeros((2, n + 2 * HALO)), np.zeros((2, n + 2 * HALO)), np.zeros((2, n))
     section, c, b = np.zeros((4, n + LANES)), np.zeros((4, n + HALO)), np.zeros((2, n))
+    step = np.zeros((4, n * do.loaded(chain.load)))
     matrix = steered_blocks.matrices(chain.order, chain.ring, 1.0, 1)
-    return Workspace(base, half, middle, strain, heading, section, c, b, np.empty(LANES), matrix)
+    return Workspace(base, half, middle, strain, heading, section, c, step, b, np.empty(LANES), matrix)
 
 
 @fill(do.factors, *TURNING, _nrt=True)
@@ -164,7 +166,7 @@ def _settle(chain, work, hi, lo):
 
 @fill(do.spend, *TURNING)
 def _spend(chain, state, t, weight, move, v, scale):
-    pass  # there are no loads
+    do.spend(chain.load, state, t, weight, move, v, scale)
 
 
 @fill(do.vanishing, *TURNING)

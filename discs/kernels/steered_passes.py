@@ -7,6 +7,7 @@ from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO
 from discs.kernels.orders import join, present, record, wrap
+from discs.kernels.shared import forward
 from discs.kernels.steered_blocks import factor, pick, solve
 from discs.kernels.steered_lanes import TURNING
 from discs.kernels.steered_links import turn
@@ -142,8 +143,12 @@ def _sweep(chain, work, state, t, h, p, move, first):
         start, mean, to = state.pi[row], p[row], b[row]
         for i in range(0, to.size, LANES):
             store(to, i, load(start, i) - load(mean, i) - half * load(to, i))
+    if do.loaded(chain.load):
+        forward(c, p, work.step, half)
+        do.push(chain.load, state, t + half, work.step, c, p, half, b)
     if first:  # later sweeps of a step use the same matrix, see `discs.integrators.midpoint`
         assemble(chain, work, c, 1.0, half * half, matrix)
+        do.guide(chain.load, c, half, half * half, matrix.d[0], matrix.o[0], matrix.d[2], matrix.o[3])
         factor(chain.order, chain.ring, matrix)
     solve(chain.order, chain.ring, matrix, b)
     return renewed(chain, work, c, half, p, b, move)
@@ -182,6 +187,7 @@ def placed(work, move):
 def _pullback(chain, work, state, t, move, c, p, g):
     placed(work, move)
     pulled(chain, work, c, g, False, False)
+    do.push(chain.load, state, t, move, c, p, -1.0, g)
 
 
 @fill(do.stiffness, *TURNING)
@@ -203,6 +209,7 @@ def _precondition(chain, stiff, state, t, move, c, d, g, matrix):
     for row in range(4):
         for i in range(stiff.o.shape[1]):
             matrix.o[row, i] = g * stiff.o[row, i]
+    do.guide(chain.load, c, d, g, matrix.d[0], matrix.o[0], matrix.d[2], matrix.o[3])
     factor(chain.order, chain.ring, matrix)
 
 
