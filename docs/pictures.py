@@ -12,6 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -23,8 +25,9 @@ from discs.analysis import modes
 from discs.chains.twist import PAPER
 from discs.loads import Damping, Torque, signals
 from discs.pictures import figures as of_discs
+from discs.pictures import geometry
 from discs.pictures.animation import Stage
-from discs.pictures.style import BLUE, GREEN, INK, LABEL, ORANGE
+from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -133,8 +136,74 @@ def small_motions() -> Figure:
     return figure
 
 
+def towards_the_rod(path: Path, sizes: tuple[int, ...] = (5, 9, 17, 65), frames: int = 46) -> None:
+    """A movie from above: N discs on the rod that they become, and the rod alone."""
+    scene = untwisting_rod()
+    runs = [simulate(lump(scene, n, "consistent"), dt=0.01, frames=frames, progress=False) for n in sizes]
+    field = solve(scene, tol=1e-4, frames=frames, progress=False)
+    figure = Figure(figsize=(9.0, 6.4), layout="constrained")
+    canvas, grid = FigureCanvasAgg(figure), figure.subplots(2, 3, sharex=True, sharey=True)
+    lines, strokes, dots = [], [], []
+    for ax, run in zip(grid.flat, [*runs, field], strict=False):
+        alone, few = run is field, run.s.size < 30
+        lines.append(ax.plot([], [], color=BLUE if alone else GREY, linewidth=6, alpha=0.8 if alone else 0.4)[0])
+        strokes.append(ax.add_collection(LineCollection([], colors=BLUE, linewidths=2.5 if few else 1.2)))
+        dots.append(ax.plot([], [], "o", color=ORANGE, markersize=4 if few else 2)[0])
+        ax.set(xlim=(-0.5, 4.5), ylim=(-2.8, 2.8), aspect="equal", xticks=[], yticks=[])
+        ax.set_title("the rod" if alone else f"{run.s.size} discs on the rod", fontsize=11)
+    last = grid.flat[-1]
+    last.set_axis_off()
+    words = "Discs seen from above (blue),\neach with a mark on its rim\n(orange). The more discs, the\n"
+    words += "closer they stay to the rod (grey)."
+    last.text(0.02, 0.55, words, transform=last.transAxes, va="center", fontsize=11)
+    clock = last.text(0.02, 0.12, "", transform=last.transAxes, fontsize=11)
+    forward = [geometry.turn(geometry.axles(run)) for run in runs]
+    pictures = []
+    for f in range(frames):
+        for line in lines:
+            line.set_data(field.x[f], field.y[f])
+        for run, ahead, stroke, dot in zip(runs, forward, strokes, dots, strict=False):
+            at, reach = np.stack([run.x[f], run.y[f]], axis=1), 0.25 * ahead[f].T
+            stroke.set_segments(list(np.stack([at - reach, at + reach], axis=1)))
+            dot.set_data(*(at + np.sin(run.theta[f])[:, None] * reach).T)
+        clock.set_text(f"t = {field.t[f]:.1f}")
+        canvas.draw()
+        picture = Image.fromarray(np.array(canvas.buffer_rgba())).convert("RGB")
+        pictures.append(picture.quantize(48, dither=Image.Dither.NONE))
+    durations = [100] * (frames - 1) + [1500]
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=durations, loop=0, optimize=True)
+
+
+def equations() -> Figure:
+    """The discs' equations and the rod's, in one small picture."""
+    figure = Figure(figsize=(9.0, 2.5))
+    lines = (
+        ("each disc rolls and does not slide", r"$\dot{\mathbf{r}}_i = \mathbf{e}_i\,\dot{\theta}_i$"),
+        (
+            r"springs and the ground's force $\lambda_i$ move it",
+            r"$m_i\,\ddot{\mathbf{r}}_i = -\,\partial V/\partial\mathbf{r}_i + \lambda_i$",
+        ),
+        (
+            "and turn it about its axle",
+            r"$I_i\,\ddot{\theta}_i = -\,\partial V/\partial\theta_i - \mathbf{e}_i\cdot\lambda_i$",
+        ),
+        (
+            r"the rod, $N\to\infty$",
+            r"$\rho\,\ddot{\mathbf{r}} = -K\,\mathbf{r}^{\prime\prime\prime\prime} + \lambda,\quad"
+            r" \alpha\,\ddot{\theta} = \beta\,\theta^{\prime\prime} - \mathbf{e}\cdot\lambda,\quad"
+            r" \dot{\mathbf{r}} = \mathbf{e}\,\dot{\theta}$",
+        ),
+    )
+    for k, (words, formula) in enumerate(lines):
+        figure.text(0.02, 0.86 - 0.235 * k, words, fontsize=11.5, color=INK, va="center")
+        figure.text(0.46, 0.86 - 0.235 * k, formula, fontsize=13, color=BLUE, va="center")
+    return figure
+
+
 def main() -> None:
     scene = untwisting_rod()
+    towards_the_rod(IMAGES / "towards-the-rod.gif")
+    equations().savefig(IMAGES / "equations.png", dpi=110)
     run = simulate(lump(scene, n=32, ends="consistent"), dt=0.02, frames=91)
     run.plot()[0].figure.savefig(IMAGES / "first-look.png", dpi=80)
     run.animate(IMAGES / "rod.gif", fps=20, size=(640, 360))
