@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from compare import load_limits, precision, report, slip
+from compare import load_limits, main_page, precision, report, slip
 from compare.background import background
 from compare.hardcases.table import Stability, kept, stability
 from compare.limits import limits
@@ -268,23 +268,27 @@ def run_main_job(options: argparse.Namespace) -> None:
     if options.scene and options.rolling:
         raise ValueError("--rolling is for the default scene; a scene file sets its law with the key 'rolling'")
     scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
+    measured, speeds = None, ""
+    own_headings = not options.scene and not options.no_limits
     with background() as executor:
         studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor, options.degree)
         print(summary(studies))
         print(
             f"\nwritten to {options.out}: convergence.csv, convergence.png, limits-of-all.png, motion.png, energy.png\n", flush=True
         )
-        if not options.scene and not options.no_limits:
+        if own_headings:
             print(limits(options.out, not options.quiet, executor=executor))
             print(f"\nwritten to {options.out}: headings.csv, limits.csv, locking.csv, limits.png\n", flush=True)
     if not options.no_speed:
-        measured, table = speed(scene, not options.quiet)
-        print(f"speed against error, processor time, plain springs:\n{table}")
+        measured, speeds = speed(scene, not options.quiet)
+        print(f"speed against error, processor time, plain springs:\n{speeds}")
         if measured is not None:
             with fresh_files(options.out) as folder:
                 measured.save(folder / "speed.csv")
                 measured.plot(folder / "speed.png")
             print(f"\nwritten to {options.out}: speed.csv, speed.png")
+    page = main_page.write(options.out, studies, own_headings, speeds, timed=measured is not None)
+    print(f"\nall tables and pictures on one page: {page}")
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,22 +1,15 @@
 """Everything on one page: scene, motion, N -> infinity, the ground's force, two laws, energy, speed, stability, versions."""
 
-import base64
-import csv
 import importlib.metadata
 import os
 import platform
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from importlib.util import find_spec
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from markdown_it import MarkdownIt
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from compare import figures
@@ -25,6 +18,7 @@ from compare.hardcases.table import stability
 from compare.limit_figures import limits_of_all
 from compare.main_job import INSTANTS, LONG, energy_runs
 from compare.outputs import fresh_files
+from compare.page import Page, table
 from compare.peers import reduced
 from compare.peers.peer import Peer
 from compare.precision import work_precision
@@ -39,76 +33,6 @@ SIZES = (17, 33, 65, 129, 257)
 FRAMES = 97  # of the fields, among them the instants of their pictures
 LAWS = {name: law.formula for name, law in ROLLING.items()}
 PACKAGES = ("numpy", "scipy", "matplotlib", "numba", "scikit-sundae", "rolling-discs")
-
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width">
-<title>{title}</title>
-<link rel="icon" href="data:,">
-<style>
-body {{ font: 16px/1.5 sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #222; }}
-img {{ max-width: 100%; }}
-table {{ border-collapse: collapse; display: block; overflow-x: auto; font-size: 0.8rem; margin: 1rem 0; }}
-th, td {{ border: 1px solid #ccc; padding: 0.2rem 0.5rem; text-align: left; white-space: nowrap; }}
-table:has(th:nth-child(12)) {{ width: max-content; max-width: 96vw; font-size: 0.65rem;
-  position: relative; left: 50%; transform: translateX(-50%); }}
-table:has(th:nth-child(12)) :is(th, td) {{ padding: 0.1rem 0.25rem; }}
-strong {{ color: #b00; }}
-h1 strong, h2 strong {{ color: inherit; }}
-</style>
-</head>
-<body>
-{body}
-</body>
-</html>
-"""
-
-
-@dataclass
-class Page:
-    """A page in Markdown, with its pictures and their data as files beside it.
-
-    folder : for the files. parts : paragraphs.
-    """
-
-    folder: Path
-    parts: list[str] = field(default_factory=list)
-
-    def add(self, *paragraphs: str) -> None:
-        """Paragraphs, headings or tables, in Markdown."""
-        self.parts += paragraphs
-
-    def figure(
-        self, name: str, drawn: Axes | Figure, caption: str, columns: Sequence[str], rows: Iterable[Sequence[object]]
-    ) -> None:
-        """A picture report_name.png, and what it shows as report_name.csv."""
-        name = f"report_{name}"
-        picture = drawn if isinstance(drawn, Figure) else drawn.figure
-        picture.savefig(self.folder / f"{name}.png", dpi=110)  # type: ignore[union-attr]
-        with (self.folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(chain([columns], rows))
-        self.add(f"![{caption}]({name}.png)", f"{caption} Data: [{name}.csv]({name}.csv).")
-
-    def markdown(self) -> str:
-        """The page; its pictures are the files beside it."""
-        return "\n\n".join(self.parts) + "\n"
-
-    def html(self, title: str) -> str:
-        """The page with its pictures inside."""
-
-        def inlined(match: re.Match[str]) -> str:
-            return f'src="data:image/png;base64,{base64.b64encode((self.folder / match[1]).read_bytes()).decode()}"'
-
-        body = MarkdownIt("commonmark", {"html": False}).enable("table").render(self.markdown())
-        return PAGE.format(title=title, body=re.sub(r'src="([^":]+\.png)"', inlined, body))
-
-
-def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table in Markdown."""
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
 
 
 def report(

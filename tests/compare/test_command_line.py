@@ -15,21 +15,24 @@ from continuum import breathing_ring
 pytestmark = pytest.mark.slow
 
 FILES = ["convergence.csv", "convergence.png", "energy.png", "limits-of-all.png", "motion.png"]
+PAGE = sorted([*FILES, "index.html"])
 
 
 def test_main_job(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("compare.main_job.LONG", 1.0)
     out = tmp_path / "new" / "out"
     assert main(["--out", str(out), "--n", "9", "17", "--tol", "1e-3", "--no-limits", "--no-speed", "--quiet"]) == 0
-    assert sorted(p.name for p in out.iterdir()) == FILES
+    assert sorted(p.name for p in out.iterdir()) == PAGE
     printed = capsys.readouterr().out
     assert "  17  0.250000  " in printed
+    assert printed.splitlines()[-1].endswith(str(out / "index.html"))
     assert (out / "convergence.csv").read_text().startswith("ends,N,k,error x")
 
 
 def test_limits_are_part_of_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("compare.main_job.LONG", 1.0)
     monkeypatch.setattr("compare.__main__.limits", lambda out, *_, **__: f"limits of {out}")
+    monkeypatch.setattr("compare.main_page._own_headings", lambda page: None)
     assert main(["--out", str(tmp_path), "--n", "9", "17", "--tol", "1e-3", "--no-speed", "--quiet"]) == 0
     assert f"limits of {tmp_path}" in capsys.readouterr().out
 
@@ -37,6 +40,7 @@ def test_limits_are_part_of_it(tmp_path, monkeypatch, capsys):
 def test_speed_against_error_is_part_of_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("compare.__main__.overview", lambda *_, **__: [])
     monkeypatch.setattr("compare.__main__.summary", lambda studies: "")
+    monkeypatch.setattr("compare.main_page.write", lambda *_, **__: "page")
     for name, few in (("SIZES", (9,)), ("OURS", ("midpoint",)), ("OTHERS", ("SciPy LSODA",)), ("COMPILED", ("midpoint",))):
         monkeypatch.setattr(f"compare.speed.{name}", few)
     monkeypatch.setattr("discs.kernels.background.USUAL", ["compiled"])
@@ -54,7 +58,7 @@ def test_steered_scene(tmp_path, capsys):
     out = tmp_path / "out"
     arguments = ["--scene", str(tmp_path / "steered.toml"), "--out", str(out), "--n", "9", "17", "--tol", "1e-5", "--degree", "2"]
     assert main([*arguments, "--no-speed", "--quiet"]) == 0
-    assert sorted(p.name for p in out.iterdir()) == FILES
+    assert sorted(p.name for p in out.iterdir()) == PAGE
     text = capsys.readouterr().out
     assert "error phi" in text
     for kind in ("own", "elements"):
@@ -67,7 +71,7 @@ def test_closed_scene(tmp_path, monkeypatch, capsys):
     out = tmp_path / "out"
     arguments = ["--scene", str(tmp_path / "ring.toml"), "--out", str(out), "--n", "8", "16", "--tol", "1e-4"]
     assert main([*arguments, "--no-speed", "--quiet"]) == 0
-    assert sorted(p.name for p in out.iterdir()) == FILES
+    assert sorted(p.name for p in out.iterdir()) == PAGE
     assert "breathing ring, field law" in capsys.readouterr().out
 
 
