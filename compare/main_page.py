@@ -78,7 +78,8 @@ def _discs(page: Page, studies: list[Study]) -> None:
     page.picture("limits-of-all.png", "Errors of all these, with the slope that they should have.", "convergence.csv")
     page.add(
         "## The motion",
-        "The centre line at several times, with arrows along the directors d₃ that turn with the discs, and the same line from above. It is the field to which the discs tend.",
+        "The centre line at several times, with arrows along the directors d₃ that turn with the discs, and the same line "
+        "from above. It is the field to which the discs tend.",
     )
     page.picture("motion.png", "The motion of the field.")
 
