@@ -13,6 +13,7 @@ import numpy as np
 from discs import checks
 from discs.arrays import Float, Int
 from discs.problem import Problem, State
+from discs.running.by_kind import energy_by_kind
 from discs.running.stats import Stats
 from discs.running.step_error import doubts
 
@@ -180,6 +181,21 @@ class Solution(Result):
     def discs(self) -> "Solution":
         """The run itself."""
         return self
+
+    @property
+    def energy_by_kind(self) -> dict[str, Float]:
+        """The energy by kind, each (F,), computed from the frames: its sum is `energy`, to rounding.
+
+        Kinetic: "translation", "rolling" and, for own headings, "turning". Springs: "bending", "torsion", and where the chain has
+        them "stretch" and "shear". "loads": what loads add, in runs that have some. A rest twist or a rest curvature is a load: the
+        springs' own energies are those of a straight rod at rest, and the difference is in "loads". (The rest stretch and shear,
+        and the rest curvature of the true curvature, are in the energies of the springs.)
+
+        Raises
+        ------
+        ValueError : for a field, a linkage, a run without its problem, and for own headings without phi_rate.
+        """
+        return energy_by_kind(self.problem, vars(self))
 
     @property
     def work(self) -> Float:

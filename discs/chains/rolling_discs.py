@@ -102,6 +102,10 @@ class RollingDiscs(SkewGradient):
     # Springs
 
     @abstractmethod
+    def springs(self, shape: Shape) -> dict[str, float]:
+        """V by kind of spring: "bending", "torsion", "stretch", "shear", those that the chain has."""
+
+    @abstractmethod
     def strains(self, shape: Shape) -> Strains:
         """The strains of all springs and their derivatives, for linearised equations."""
 

@@ -134,6 +134,9 @@ class SlavedSystem(RollingDiscs):
     def potential(self, shape: Float) -> float:
         return self._springs.potential(shape)
 
+    def springs(self, shape: Float) -> dict[str, float]:
+        return self._springs.energies(shape)
+
     def strains(self, shape: Float) -> Strains:
         return self._springs.strains(shape)
 

@@ -189,6 +189,10 @@ class SteeredSystem(RollingDiscs):
     def potential(self, shape: Links) -> float:
         return 0.5 * float((self._stiffness * self._strain(shape.d, shape.middle) ** 2).sum())
 
+    def springs(self, shape: Links) -> dict[str, float]:
+        energies = 0.5 * (self._stiffness * self._strain(shape.d, shape.middle) ** 2).sum(axis=1)
+        return dict(zip(("stretch", "shear", "torsion", "bending"), energies.tolist(), strict=True))
+
     def polarised(self, shape: Links, other: Links) -> float:
         raise ValueError("V is not quadratic for discs with their own headings")
 

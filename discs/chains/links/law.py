@@ -46,6 +46,9 @@ class LinkLaw(Protocol):
     def potential(self, d: Float) -> float:
         """V of links."""
 
+    def energies(self, d: Float) -> dict[str, float]:
+        """V of links by kind of spring: "bending", "torsion" and, for laws that stretch, "stretch"."""
+
     def polarised(self, d: Float, other: Float) -> float:
         """The symmetric bilinear form V(d, d') with V(d, d) = V(d); ValueError unless V is quadratic."""
 

@@ -45,6 +45,10 @@ class LinearCurvature(LinkLaw):
     def potential(self, d: Float) -> float:
         return self.polarised(d, d)
 
+    def energies(self, d: Float) -> dict[str, float]:
+        bending = (self.bend * stencils.bends(d[:2], self._ends) ** 2).sum()
+        return {"bending": 0.5 * float(bending), "torsion": 0.5 * float(self.twist @ d[2] ** 2)}
+
     def polarised(self, d: Float, other: Float) -> float:
         """The symmetric bilinear form V(d, d') with V(d, d) = V(d)."""
         bends, others = stencils.bends(d[:2], self._ends), stencils.bends(other[:2], self._ends)

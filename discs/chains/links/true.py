@@ -84,6 +84,11 @@ class TrueCurvature(LinkLaw):
         bend = self._turning(d) - self._rest
         return 0.5 * float(self._bending @ bend**2 + self._stretching @ stretch**2 + self._torsion @ twist**2)
 
+    def energies(self, d: Float) -> dict[str, float]:
+        bending, torsion = self._bending @ (self._turning(d) - self._rest) ** 2, self._torsion @ (d[2] / self._k) ** 2
+        stretch = self._stretching @ (np.hypot(d[0], d[1]) / self._k - 1) ** 2
+        return {"bending": 0.5 * float(bending), "torsion": 0.5 * float(torsion), "stretch": 0.5 * float(stretch)}
+
     def polarised(self, d: Float, other: Float) -> float:
         raise ValueError("V is not quadratic with curvature='true'")
 
