@@ -7,6 +7,7 @@ from pathlib import Path
 from compare import load_limits, main_page, precision, report, slip
 from compare.background import background
 from compare.hardcases.table import Stability, kept, stability
+from compare.help import COMMANDS
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
@@ -24,16 +25,13 @@ from discs.chains.rolling import ROLLING
 from discs.kernels.background import wait_for_kernels
 
 
-def about(what: object) -> str:
-    """The first paragraph of a docstring of a function or module, for `--help`."""
-    return (what.__doc__ or "").split("\n\n")[0]
-
-
 def parser() -> argparse.ArgumentParser:
     """The options."""
     p = argparse.ArgumentParser(
         prog="python -m compare",
-        description="N rolling discs against the nonholonomic Cosserat rod: table, convergence, motion and energy.",
+        description="Compare N rolling discs with the nonholonomic Cosserat rod to which they tend. Tables and pictures of "
+        "convergence, motion, energy and speed are written to the folder --out, and all of them on one page, index.html.",
+        epilog="example: python -m compare --n 17 33 65 129 --out out",
     )
     p.add_argument("--scene", metavar="FILE.toml", help="scene to compare; default: the paper's untwisting rod")
     p.add_argument("--rolling", choices=tuple(ROLLING), help="law of rolling of the default scene (default: field)")
@@ -59,16 +57,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_main_job)
     commands = p.add_subparsers(metavar="COMMAND", title="commands (without one: the comparison above)")
-    add_precision(
-        commands.add_parser("precision", help="speed against error beside other integrators", description=about(precision))
-    )
-    add_stability(commands.add_parser("stability", help="hard cases by every method", description=about(stability)))
-    add_trust(
-        commands.add_parser("trust", help="random scenes: whether errors stay below the tolerances", description=about(trust))
-    )
-    add_loads(commands.add_parser("loads", help="N to infinity under loads", description=about(load_limits)))
-    add_slip(commands.add_parser("slip", help="discs that slide: which limit first?", description=about(slip)))
-    add_report(commands.add_parser("report", help="everything on one page", description=about(report)))
+    options = add_precision, add_stability, add_trust, add_loads, add_slip, add_report
+    for add, (name, (short, says, example)) in zip(options, COMMANDS.items(), strict=True):
+        add(commands.add_parser(name, help=short, description=says, epilog=f"example: python -m compare {name} {example}"))
     return p
 
 
@@ -179,12 +170,12 @@ def add_precision(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--n", metavar="N", type=int, nargs="+", default=list(precision.SIZES), help="numbers of discs (default: 32 ... 2048)"
     )
+    p.add_argument("--scene", metavar="FILE.toml", help="a scene of your own instead of --scenes (default: none)")
     p.add_argument(
         "--scenes",
         metavar="SCENE",
         nargs="+",
         choices=precision.SCENES,
-        default=list(precision.UNLOADED),
         help=f"of {', '.join(precision.SCENES)}, the last two with loads (default: those without)",
     )
     p.add_argument(
@@ -236,9 +227,15 @@ def write_stability(found: Stability, out: str) -> None:
 def run_precision(options: argparse.Namespace) -> None:
     """Measure speed against error and write table and picture; an interrupted run writes its results to precision-partial.*."""
     wait_for_kernels()
+    if options.scene and options.scenes:
+        raise ValueError("--scene FILE.toml takes the place of --scenes; give one of them")
+    if options.scene:
+        own = read_scene(options.scene)
+        scenes = {own.name: own}
+    else:
+        scenes = {name: precision.SCENES[name]() for name in options.scenes or precision.UNLOADED}
     found, name, stopped = WorkPrecision([], {}, {}), "precision", False
     with fresh_files(options.out) as folder:
-        scenes = {name: precision.SCENES[name]() for name in options.scenes}
         try:
             precision.work_precision(
                 scenes, tuple(options.n), None, options.repeats, options.seconds, not options.quiet, into=found

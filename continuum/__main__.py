@@ -16,11 +16,17 @@ from discs import command_line
 def parser() -> argparse.ArgumentParser:
     """The parser of the command line."""
     p = argparse.ArgumentParser(
-        prog="python -m continuum", description="The nonholonomic Cosserat rod: its fields, and its discs. Any consistent units."
+        prog="python -m continuum",
+        description="The nonholonomic Cosserat rod: its fields, and its discs. Any consistent units.",
+        epilog="example: python -m continuum solve --tol 1e-6 --save field.nc",
     )
     commands = p.add_subparsers(metavar="COMMAND", title="commands", required=True, dest="command")
     field = commands.add_parser(
-        "solve", help="the fields of a scene to a tolerance", description="Compute the fields of a scene, with an error estimate."
+        "solve",
+        help="the fields of a scene to a tolerance",
+        description="Compute the fields of a scene to a tolerance and print a summary with an estimate of the error. With --save "
+        "they are written to a file.",
+        epilog="example: python -m continuum solve --tol 1e-6 --save field.nc",
     )
     _add_scene(field)
     field.add_argument(
@@ -42,11 +48,12 @@ def parser() -> argparse.ArgumentParser:
         "discs",
         help="a scene's rod as N discs",
         description="Lump a scene's rod into N discs and run them as python -m discs run does.",
+        epilog="example: python -m continuum discs --scene FILE.toml --n 64 --save run.nc",
     )
     _add_scene(discs)
     command_line.add_run_options(discs)
     discs.set_defaults(run=run_discs)
-    command_line.add_file_commands(commands)
+    command_line.add_file_commands(commands, "python -m continuum")
     return p
 
 

@@ -8,7 +8,7 @@ from discs import command_line
 from discs.analysis.lyapunov import lyapunov
 from discs.analysis.modes import modes
 from discs.chains.rolling import ROLLING
-from discs.chains.twist import DURATION, PAPER, STEERED, TURNS, untwisting_chain
+from discs.chains.twist import DURATION, PAPER, STEERED, TURNS, circle_chain, untwisting_chain
 from discs.problem import Problem
 
 UNITS = {
@@ -30,24 +30,35 @@ def parser() -> argparse.ArgumentParser:
         prog="python -m discs",
         description="N rolling discs joined by springs. Any consistent units. "
         "To run a scene from a file: python -m continuum discs --scene FILE.toml.",
+        epilog="example: python -m discs run --n 64 --t 4.5 --save run.nc",
     )
     commands = p.add_subparsers(metavar="COMMAND", title="commands", required=True, dest="command")
     run = commands.add_parser(
         "run",
-        help="run the paper's twist",
-        description="A straight rod of discs, twisted by half a turn, lets go. With --save every frame is written as it comes; "
-        "after Ctrl-C or a crash the same command goes on where it was.",
+        help="run the paper's twist, or a rolling circle",
+        description="Run a straight rod of discs that is twisted by half a turn and released, or with --ring a closed circle "
+        "of discs. A summary is printed. With --save every frame is written as it comes; after Ctrl-C or a crash the same "
+        "command continues the run.",
+        epilog="example: python -m discs run --n 64 --t 4.5 --save run.nc",
     )
     run.add_argument("--t", metavar="T", type=float, default=DURATION, help=f"duration, time (default: {DURATION})")
     run.add_argument("--rolling", choices=(*ROLLING, "own"), default="field", help="law; own: own headings (default: field)")
     run.add_argument("--twist", metavar="TURNS", type=float, default=TURNS, help=f"turns between the ends (default: {TURNS})")
+    run.add_argument(
+        "--ring",
+        metavar="RATE",
+        type=float,
+        help="instead of the twisted rod a closed circle of discs that all roll inwards at this rate, rad per time (default: none)",
+    )
     command_line.add_run_options(run)
     _add_rod(run)
     run.set_defaults(run=run_twist)
     chaos = commands.add_parser(
         "lyapunov",
         help="rates at which errors grow along the motion",
-        description="Lyapunov exponents of the twisted rod that lets go, and when an error of 1e-16 has grown to 1e-3.",
+        description="Print Lyapunov exponents of the twisted rod after its release, and the time after which an error of 1e-16 has "
+        "grown to 1e-3. No file is written.",
+        epilog="example: python -m discs lyapunov --n 17 --count 2",
     )
     chaos.add_argument("--t", metavar="T", type=float, default=DURATION, help=f"duration, time (default: {DURATION})")
     chaos.add_argument("--twist", metavar="TURNS", type=float, default=TURNS, help=f"turns between the ends (default: {TURNS})")
@@ -57,11 +68,13 @@ def parser() -> argparse.ArgumentParser:
     small = commands.add_parser(
         "modes",
         help="rates and shapes of small motions",
-        description="The slowest small motions of the straight rod, at rest or rolling sideways: growth and frequency of each.",
+        description="Print growth and frequency of the slowest small motions of the straight rod, at rest or rolling sideways. No "
+        "file is written.",
+        epilog="example: python -m discs modes --n 64 --omega 0.5",
     )
     _add_straight(small, n=64, count=8, what="modes, zero left out")
     small.set_defaults(run=show_modes)
-    command_line.add_file_commands(commands)
+    command_line.add_file_commands(commands, "python -m discs")
     return p
 
 
@@ -115,7 +128,14 @@ def show_exponents(options: argparse.Namespace) -> None:
 
 def run_twist(options: argparse.Namespace) -> None:
     """The command `run`."""
-    problem = untwisting_chain(options.n, options.rolling, options.ends, options.t, options.twist, options.degree, **_rod(options))
+    if options.ring is None:
+        problem = untwisting_chain(
+            options.n, options.rolling, options.ends, options.t, options.twist, options.degree, **_rod(options)
+        )
+    else:
+        if options.twist != TURNS or options.ends != "springs":
+            raise ValueError("--ring takes no --twist and no --ends: a circle has no ends; leave them out")
+        problem = circle_chain(options.n, options.ring, options.rolling, options.t, options.degree, **_rod(options))
     command_line.run_discs(problem, options)
 
 

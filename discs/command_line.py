@@ -94,9 +94,14 @@ def add_saving(p: argparse.ArgumentParser) -> None:
     p.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
-def add_file_commands(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_file_commands(commands: "argparse._SubParsersAction[argparse.ArgumentParser]", program: str) -> None:
     """The commands that read a file."""
-    p = commands.add_parser("info", help="say what is in a file", description="Say what is in a file.")
+    p = commands.add_parser(
+        "info",
+        help="say what is in a file",
+        description="Print what is in the file of a saved run: a summary, its parameters and the versions that it was made with.",
+        epilog=f"example: {program} info run.nc",
+    )
     p.add_argument("file", metavar="FILE", help="a saved run")
     p.set_defaults(run=lambda options: print(about(options.file)))
     for name, what, out in (
@@ -104,7 +109,12 @@ def add_file_commands(commands: "argparse._SubParsersAction[argparse.ArgumentPar
         ("animate", "a movie of the discs as they roll", "run.mp4"),
         ("view", "a page to turn and play the run in three dimensions", "run.html"),
     ):
-        p = commands.add_parser(name, help=what, description=what[0].upper() + what[1:] + ".")
+        p = commands.add_parser(
+            name,
+            help=what,
+            description=f"Read a saved run and write {what}.",
+            epilog=f"example: {program} {name} run.nc --out {out}",
+        )
         p.add_argument("file", metavar="FILE", help="a saved run")
         p.add_argument("--out", metavar="FILE", default=out, help=f"file to write (default: {out})")
         if name == "animate":

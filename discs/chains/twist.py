@@ -1,4 +1,4 @@
-"""The paper's twisted rod as a chain of discs: the default scene."""
+"""The scenes of the command line as chains of discs: the paper's twisted rod, and a rolling circle."""
 
 from typing import Any, TypedDict
 
@@ -67,13 +67,35 @@ def untwisting_chain(
     ValueError : for an unknown parameter, or a value outside its range.
     """
     steered = checks.choice("rolling", rolling, (*ROLLING, "own")) == "own"
+    checks.choice("ends (a straight rod)", ends, ("springs",) if steered else ("springs", "consistent", "paper"))
+    chain = _chain(n, rolling, ends, degree, parameters)
+    x, y, theta, omega = twisted(chain.s, chain.length, np.pi * checks.number("twist", twist))
+    return Problem(chain, State(x, y, theta, omega, phi=0 * x if steered else None), duration)
+
+
+def circle_chain(
+    n: int, omega: float, rolling: str = "field", duration: float = DURATION, degree: int = 1, **parameters: Any
+) -> Problem:
+    """A closed circle of n discs that all roll at the rate `omega`, rad per time, towards the centre if it is positive.
+
+    With a = length/(2 pi) and phi the direction of the line, r = a (cos(s/a), sin(s/a)), phi = s/a + pi/2, and the contact points
+    move at omega R towards the centre. Other parameters and errors as for `untwisting_chain`.
+    """
+    chain = _chain(n, rolling, "ring", degree, parameters)
+    a, angle = chain.length / (2 * np.pi), 2 * np.pi * chain.s / chain.length
+    phi = angle + np.pi / 2 if isinstance(chain, SteeredChain) else None
+    rate = checks.number("omega", omega)
+    return Problem(chain, State(a * np.cos(angle), a * np.sin(angle), 0 * angle, 0 * angle + rate, phi=phi), duration)
+
+
+def _chain(n: int, rolling: str, ends: str, degree: int, parameters: dict[str, Any]) -> Chain | SteeredChain:
+    """A chain with the paper's parameters, but for those given."""
+    steered = checks.choice("rolling", rolling, (*ROLLING, "own")) == "own"
     standard = PAPER | STEERED if steered else PAPER
     for name in parameters:
         checks.choice("parameter of the chain" + (" (own headings)" if steered else ""), name, standard)
     given: dict[str, Any] = {"n": n, "ends": ends} | standard | parameters
-    checks.choice("ends (a straight rod)", ends, ("springs",) if steered else ("springs", "consistent", "paper"))
-    if not steered:
-        elements.refuse(degree)
-    chain: Chain | SteeredChain = SteeredChain(**given, degree=degree) if steered else Chain(**given, rolling=rolling)
-    x, y, theta, omega = twisted(chain.s, chain.length, np.pi * checks.number("twist", twist))
-    return Problem(chain, State(x, y, theta, omega, phi=0 * x if steered else None), duration)
+    if steered:
+        return SteeredChain(**given, degree=degree, turns=int(ends == "ring"))
+    elements.refuse(degree)
+    return Chain(**given, rolling=rolling)

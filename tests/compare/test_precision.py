@@ -247,3 +247,18 @@ def test_an_interrupted_run_leaves_what_it_has_finished(tmp_path, capsys, monkey
     sizes = [line.split(",")[1] for line in (out / "precision-partial.csv").read_text().splitlines()]
     assert set(sizes) == {"n", "9"}
     assert sorted(p.name for p in out.iterdir()) == [f"precision-partial.{end}" for end in ("csv", "md", "png")]
+
+
+def test_own_scene(tmp_path, monkeypatch, capsys):
+    """The scene of the file is what is measured; it takes the place of --scenes."""
+    (tmp_path / "mine.toml").write_text('scene = "breathing_ring"\nradius = 0.7\nduration = 0.3\n')
+    given = {}
+    monkeypatch.setattr("compare.__main__.wait_for_kernels", lambda: None)
+    monkeypatch.setattr("compare.precision.work_precision", lambda scenes, *_, into: given.update(scenes))
+    monkeypatch.setattr(WorkPrecision, "plot", lambda self, path: path.write_text(""))
+    arguments = ["precision", "--scene", str(tmp_path / "mine.toml"), "--quiet", "--out", str(tmp_path / "out")]
+    assert main(arguments) == 0
+    ((name, scene),) = given.items()
+    assert (name, scene.closed, scene.rod.radius, scene.duration) == ("breathing ring", True, 0.7, 0.3)
+    assert main([*arguments, "--scenes", "unit"]) == 2
+    assert "--scene FILE.toml takes the place of --scenes" in capsys.readouterr().err

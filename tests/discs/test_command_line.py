@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import time
 import numpy as np
 import pytest
 
+from compare.__main__ import parser as parser_of_compare
 from continuum.__main__ import parser as parser_of_continuum
 from discs import Solution, load, simulate
 from discs.__main__ import main, parser
@@ -175,3 +177,33 @@ def test_every_option_says_what_it_is_and_its_default(make):
             if action.option_strings and not isinstance(action, switches):
                 assert "(default: " in action.help, action
                 assert np.isscalar(action.default) or action.default in (None, []), action
+
+
+@pytest.mark.parametrize("make", [parser, parser_of_continuum, parser_of_compare], ids=["discs", "continuum", "compare"])
+def test_every_command_has_an_example(make):
+    """Its help says what it does in sentences, and ends with an example that the command line accepts."""
+    for p in subparsers(make()):
+        assert p.description.endswith("."), p.prog
+        assert "`" not in p.description, p.prog
+        *_, last = p.format_help().strip().partition("example: ")
+        called, *arguments = shlex.split(last)
+        assert called == "python", p.prog
+        assert " ".join([called, *arguments]).startswith(p.prog)
+        make().parse_args(arguments[2:])
+
+
+@pytest.mark.parametrize("law", ["field", "own"])
+def test_a_rolling_circle(law, tmp_path, capsys):
+    """It stays a circle, and begins to shrink at the rate R omega."""
+    path, fields = tmp_path / "ring.nc", ["--rolling", law, "--radius", "0.7", "--length", "3.1", "--engine", "plain"]
+    run_of = ["run", "--ring", "0.3", "--n", "12", "--t", "0.0002", "--frames", "3", "--method", "midpoint", "--dt", "0.0001"]
+    assert main([*run_of, *fields, "--save", str(path), "--quiet"]) == 0
+    run = load(path)
+    assert run.problem.chain.ends == "ring"
+    r = np.hypot(run.x, run.y)
+    np.testing.assert_allclose(r, r[:, :1] + 0 * r, atol=1e-12)
+    assert r[0, 0] == pytest.approx(3.1 / (2 * np.pi))
+    stretched = np.sinc(2 / 12) if law == "field" else 1.0  # r' of the discs on a circle, by central differences
+    assert (r[-1, 0] - r[0, 0]) / 0.0002 == pytest.approx(-0.7 * 0.3 * stretched, rel=2e-3)
+    assert main(["run", "--ring", "0.3", "--twist", "1"]) == 2
+    assert "--ring takes no --twist and no --ends" in capsys.readouterr().err

@@ -1,0 +1,39 @@
+"""Help of the commands of `python -m compare`: in a few words, in sentences with the files written, and options of an example."""
+
+COMMANDS = {
+    "precision": (
+        "speed against error beside other integrators",
+        "Measure processor time against error of our methods and of other integrators on the same problem. Written: a table of all "
+        "runs (precision.csv), a report (precision.md) and a picture (precision.png). An interrupted run keeps its results so far.",
+        "--n 32 128 --repeats 3",
+    ),
+    "stability": (
+        "hard cases by every method",
+        "Run hard cases by every method and show which pass: stiff chains, long steps, long times. Written: stability.md, "
+        "stability.csv, stability.png. After an interruption the same command continues.",
+        "--quick",
+    ),
+    "trust": (
+        "random scenes: whether errors stay below the tolerances",
+        "Solve random scenes to random tolerances and count how often the error stays below. Written: trust.md and trust.csv. "
+        "After an interruption the same command continues.",
+        "--scenes 20 --seed 1",
+    ),
+    "loads": (
+        "N to infinity under loads",
+        "Compare N loaded discs with the loaded rod, for torques, a slope, damping and rest shapes. Written: loads.csv, loads.png.",
+        "--n 33 65 129",
+    ),
+    "slip": (
+        "discs that slide: which limit first?",
+        "Let discs slide a little, and compare them with rolling discs and with the rod: which limit is to be taken first? "
+        "Written: slip.csv, slip.png.",
+        "--n 9 17 33",
+    ),
+    "report": (
+        "everything on one page",
+        "Write one page with the motion, N to infinity, the ground's force, both laws of rolling, energy, speed and stability: "
+        "report.html with its pictures inside, report.md, and every picture with its data.",
+        "--n 17 33 65",
+    ),
+}
