@@ -1,6 +1,7 @@
 """`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it.
 
-With `--tested` those that the short suite runs: midpoint and Gauss methods for every chain, all kinds for the field law.
+Those of gradients and Lyapunov exponents are among them (`discs.analysis.tangent`). With `--tested` those that the short suite
+runs: midpoint and Gauss methods for every chain, all kinds for the field law, without tangents.
 """
 
 import argparse
@@ -8,6 +9,7 @@ import subprocess
 import sys
 from typing import Any
 
+from discs.analysis.tangent import prepare
 from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import ROLLING
 from discs.integrators import METHODS, FixedStep, Integrator
@@ -63,6 +65,10 @@ def compile_for(law: str, size: str, tested: bool) -> None:
             simulate(problem, first, 0.005, frames=1, want=want, progress=False, engine="compiled")
         how = ", in lanes" if n == MANY else ""
         print(f"{words}{how}: {', '.join(method.name for method in methods)} compiled", flush=True)
+        for method in [] if tested else methods:
+            if method.name == "gauss4" or (method.name == "midpoint" and problem.system.quadratic):
+                prepare(problem, method)
+                print(f"{words}{how}: gradients by steps like those of {method.name} compiled", flush=True)
 
 
 if __name__ == "__main__":

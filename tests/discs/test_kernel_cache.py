@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from discs.integrators.rk4 import Explicit
+from discs.kernels import __main__ as ahead
 from discs.kernels import compiled, driver
 from discs.kernels.slaved import Slaved
 from discs.skew import Phase
@@ -96,3 +97,15 @@ def test_earlier_kernels_go_when_nothing_uses_them(tmp_path, monkeypatch):
     rod.write_text("one = 3")
     third = Path(compiled._cache.__wrapped__((rod,), "march-A"))
     assert sorted(tmp_path.glob("kernels-*")) == sorted([other, third])
+
+
+@pytest.mark.parametrize(("law", "names"), [("field", ["midpoint", "gauss4"]), ("own", ["gauss4"])])  # own headings: a secant
+def test_kernels_of_gradients_are_compiled_ahead(monkeypatch, law, names):
+    prepared = []
+    monkeypatch.setattr(ahead, "simulate", lambda *given, **options: None)
+    monkeypatch.setattr(ahead, "simulate_many", lambda *given, **options: None)
+    monkeypatch.setattr(ahead, "prepare", lambda problem, method: prepared.append(method.name))
+    ahead.compile_for(law, "few", tested=True)
+    assert not prepared
+    ahead.compile_for(law, "few", tested=False)
+    assert sorted(prepared, reverse=True) == names
