@@ -158,6 +158,11 @@ def add_report(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--tol", metavar="TOL", type=float, default=1e-4, help="largest error of the fields, length and rad (default: 1e-4)"
     )
+    p.add_argument(
+        "--scene",
+        metavar="FILE.toml",
+        help="a rod with free ends and no loads, under each law (default: the untwisting rod)",
+    )
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_report)
 
@@ -256,7 +261,8 @@ def run_precision(options: argparse.Namespace) -> None:
 def run_report(options: argparse.Namespace) -> None:
     """Write everything on one page."""
     wait_for_kernels()
-    report.report(options.out, options.n, options.tol, progress=not options.quiet)
+    scene = read_scene(options.scene) if options.scene else None
+    report.report(options.out, options.n, options.tol, progress=not options.quiet, scene=scene)
     print(f"written to {options.out}: report.html, report.md, pictures and their data")
 
 

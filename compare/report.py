@@ -36,7 +36,13 @@ PACKAGES = ("numpy", "scipy", "matplotlib", "numba", "scikit-sundae", "rolling-d
 
 
 def report(
-    out: str | Path, n: Sequence[int] = SIZES, tol: float = 1e-4, timed: int = 32, long: float = LONG, progress: bool = True
+    out: str | Path,
+    n: Sequence[int] = SIZES,
+    tol: float = 1e-4,
+    timed: int = 32,
+    long: float = LONG,
+    progress: bool = True,
+    scene: Scene | None = None,
 ) -> None:
     """Write report.html, which contains its pictures, report.md, and every picture and its data.
 
@@ -46,11 +52,16 @@ def report(
     n : numbers of discs for N -> infinity.
     tol : largest error of the fields.
     timed : number of discs where speed is measured.
-    long : durations of the paper's scene over which the energy is shown.
+    long : durations of the scene over which the energy is shown.
     progress : show progress bars.
+    scene : None for the paper's; each law of rolling is taken in turn.
+
+    Raises
+    ------
+    ValueError : for a scene that is not a rod with two free ends, linear curvature, and no loads.
     """
     checks.number("tol", tol, positive=True)
-    scenes = {law: untwisting_rod(rolling=law) for law in LAWS}
+    scenes = under_each_law(untwisting_rod() if scene is None else scene)
     with (
         fresh_files(out) as folder,
         background() as beside,
@@ -87,6 +98,16 @@ def report(
         (folder / "report.html").write_text(page.html(title), encoding="utf-8")
 
 
+def under_each_law(scene: Scene) -> dict[str, Scene]:
+    """A scene under each law of rolling. ValueError for one that the report does not cover."""
+    if scene.closed or scene.steered or scene.loads or scene.rod.curvature != "linear":
+        raise ValueError(
+            "the report compares the laws of rolling of a rod with two free ends, linear curvature and no loads, which the "
+            f"{scene.name} is not: take python -m compare --scene FILE.toml, the main job, for this scene"
+        )
+    return {law: replace(scene, rolling=law) for law in LAWS}
+
+
 def _studied(scene: Scene, n: tuple[int, ...], field: Solution, executor: Executor) -> list[Future[Study]]:
     return [executor.submit(convergence, scene, n, ends, field, progress=False) for ends in ("springs", "consistent")]
 
@@ -98,8 +119,7 @@ def _scene(page: Page, scene: Scene) -> None:
     page.add(
         "# N rolling discs and the rod they become",
         "N vertical discs roll on a plane without sliding, joined by springs that resist bending and torsion. As N grows they "
-        "become the nonholonomic Cosserat rod of J. Vankerschaver. A straight rod at rest is twisted by θ = −(π/2) cos(πs/ℓ) and "
-        "let go.",
+        f"become the nonholonomic Cosserat rod of J. Vankerschaver. The scene of this page is the {scene.name}.",
         "## The scene",
         table(("quantity", "value"), values),
         f"Time runs to {scene.duration:g}. The laws of rolling: {'; '.join(f'{law}, {words}' for law, words in LAWS.items())}.",

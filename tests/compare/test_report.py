@@ -14,7 +14,8 @@ from compare import report as module
 from compare import stability
 from compare.__main__ import main
 from compare.hardcases.cases import cases
-from compare.report import Page, report
+from compare.page import Page
+from compare.report import report, under_each_law
 
 pytestmark = pytest.mark.slow
 
@@ -115,12 +116,34 @@ def test_text_is_escaped(tmp_path):
 
 
 def test_command_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(module, "report", lambda out, n, tol, progress: print(f"report of {n} to {tol} in {out}"))
+    monkeypatch.setattr(module, "report", lambda out, n, tol, progress, scene: print(f"report of {n} to {tol} in {out}: {scene}"))
     assert main(["report", "--n", "9", "17", "--tol", "0.01", "--quiet", "--out", str(tmp_path)]) == 0
-    assert f"report of [9, 17] to 0.01 in {tmp_path}" in capsys.readouterr().out
+    assert f"report of [9, 17] to 0.01 in {tmp_path}: None" in capsys.readouterr().out
 
 
 def test_bad_input_leaves_nothing(tmp_path, capsys):
     assert main(["report", "--tol", "-1", "--quiet", "--out", str(tmp_path / "new")]) == 2
     assert "tol must be a positive finite number" in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
+
+
+def test_own_scene(tmp_path, capsys, monkeypatch):
+    """The rod of the file, under each law, and on the page with its numbers."""
+    (tmp_path / "mine.toml").write_text('scene = "untwisting_rod"\nradius = 0.7\nduration = 0.3\n')
+    given = []
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "report", lambda *_, scene, **__: given.append(scene))
+        assert main(["report", "--scene", str(tmp_path / "mine.toml"), "--quiet", "--out", str(tmp_path)]) == 0
+    scenes = under_each_law(*given)
+    assert [(scene.rolling, scene.rod.radius, scene.duration) for scene in scenes.values()] == [
+        ("field", 0.7, 0.3),
+        ("unit", 0.7, 0.3),
+    ]
+    page = Page(tmp_path)
+    module._scene(page, scenes["unit"])
+    assert "| radius | 0.7 |" in page.markdown()
+    assert "Time runs to 0.3" in page.markdown()
+    (tmp_path / "ring.toml").write_text('scene = "breathing_ring"\n')
+    assert main(["report", "--scene", str(tmp_path / "ring.toml"), "--quiet", "--out", str(tmp_path / "new")]) == 2
+    assert "a rod with two free ends, linear curvature and no loads, which the breathing ring is not" in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
