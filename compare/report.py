@@ -116,10 +116,11 @@ def _scene(page: Page, scene: Scene) -> None:
     rod = scene.rod
     names = ("length", "density", "spin_inertia", "torsion_stiffness", "bending_stiffness", "radius")
     values = [(name.replace("_", " "), "varies along the rod" if name in rod.varying else getattr(rod, name)) for name in names]
+    twisted = ", straight and at rest, twisted by θ ∝ cos(πs/ℓ) and released" if scene.name == "untwisting rod" else ""
     page.add(
         "# N rolling discs and the rod they become",
         "N vertical discs roll on a plane without sliding, joined by springs that resist bending and torsion. As N grows they "
-        f"become the nonholonomic Cosserat rod of J. Vankerschaver. The scene of this page is the {scene.name}.",
+        f"become the nonholonomic Cosserat rod of J. Vankerschaver. The scene of this page is the {scene.name}{twisted}.",
         "## The scene",
         table(("quantity", "value"), values),
         f"Time runs to {scene.duration:g}. The laws of rolling: {'; '.join(f'{law}, {words}' for law, words in LAWS.items())}.",
