@@ -231,7 +231,7 @@ def _run(
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
-    stepwise = isinstance(integrator, OneStep)
+    stepwise = isinstance(integrator, OneStep) and not (integrator.in_lanes and system.lanes is not None)
     recorded = (stepwise or integrator.runs_whole) and checkpoint is None and not want and system.load is None
     there = bool(because) or kernels(engine, problem, integrator, h, not recorded, not progress)
     if not there:
