@@ -44,7 +44,7 @@ _READILY = ContextVar("readily", default=False)
 _KERNELS: set[Callable[..., Any]] = set()
 _WAITING: list[Callable[[], object]] = []  # registrations to be made with numba
 _MODULES: dict[str, dict[str, Any]] = {}  # modules with parts, forms or kernels, and their contents
-_FORMS: dict[type, set[str]] = {}  # modules with the forms for a chain or a method
+_FORMS: dict[type, set[tuple[str, str]]] = {}  # modules of stubs, and of their forms for a chain or a method
 
 
 def later(what: Callable[[], object]) -> None:
@@ -104,7 +104,7 @@ def fill(of: Any, *kinds: type, **options: Any) -> Callable[[Callable[..., Any]]
 
         later(tell)
         for kind in kinds:
-            _FORMS.setdefault(kind, set()).add(function.__module__)
+            _FORMS.setdefault(kind, set()).add((of.__module__, function.__module__))
             of.register(kind, function)
         return function
 
@@ -222,11 +222,13 @@ def _files(function: Callable[..., Any], *kinds: type) -> tuple[Path, ...]:
     """The files that a kernel may call with these types of parameters."""
     _MODULES[function.__module__] = function.__globals__
     found: set[str] = set()
-    waiting = {function.__module__}.union(*(_FORMS[kind] for kind in kinds))
+    forms = {pair for kind in kinds for pair in _FORMS[kind]}
+    waiting = {function.__module__}
     while waiting:
         found |= waiting
         held = [value for name in waiting for value in _MODULES[name].values()]
         names = {value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", "") for value in held}
+        names |= {form for stub, form in forms if stub in found}  # not those of stubs that other kernels call
         waiting = (names & _MODULES.keys()) - found
     return tuple(sorted(Path(_MODULES[name].get("__file__", name)) for name in found))
 

@@ -234,3 +234,14 @@ def test_engines_agree_to_some_ulps():
                 one, other = getattr(a, name)[-1], getattr(b, name)[-1]
                 apart = np.abs(one - other).max() / np.spacing(np.abs(other).max())
                 assert apart <= (128 if name == "omega" else ulps), (rolling, method, name, apart)
+
+
+def test_the_cache_of_a_kernel_does_not_depend_on_what_else_is_imported():
+    """Forms of stubs that another kernel calls, as those of gradients, are not among the files of `march`."""
+    from discs.kernels import driver, trace
+
+    method, chain = METHODS["gauss6"]().parameters, uneven(9, Model("springs", "field")).system.parameters
+    files = {path.name for path in compiled._files(driver.march.__wrapped__, type(method), type(chain))}
+    assert {"driver.py", "slaved.py", "collocation.py"} <= files
+    assert "trace.py" not in files
+    assert "trace.py" in {path.name for path in compiled._files(trace.trace.__wrapped__, type(method), type(chain))}
