@@ -8,7 +8,7 @@ from typing import Any
 
 from discs.arrays import Float
 from discs.kernels import driver
-from discs.kernels.compiled import _FORMS, compiled, jit
+from discs.kernels.compiled import compiled, formed, jit
 
 equations = jit(driver.reduced.__wrapped__)  # type: ignore[attr-defined]
 
@@ -19,4 +19,4 @@ def held(chain: Any) -> Callable[[float, Float, Float], None]:
     def f(t, y, out):  # type: ignore[no-untyped-def]
         equations(chain, t, y, out)
 
-    return compiled(f, *(kind for kind in (type(chain), *map(type, chain)) if kind in _FORMS))
+    return compiled(f, *formed((type(chain), *map(type, chain))))

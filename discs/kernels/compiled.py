@@ -19,7 +19,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache, partial, singledispatch, wraps
@@ -183,7 +183,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
                 kinds += tuple(map(type, argument))
         if kinds in known and not _READILY.get():
             return known[kinds](*arguments)
-        forms = [kind for kind in kinds if kind in _FORMS]
+        forms = formed(kinds)
         with ExitStack() as stack:
             if _READILY.get():
                 if kinds not in known and _surely_missing(function, *forms):
@@ -197,6 +197,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
     call.known = known  # type: ignore[attr-defined]  # for tests
     return call
+
+
+def formed(kinds: Iterable[type]) -> list[type]:
+    """Those kinds of parameters that have forms of stubs."""
+    return [kind for kind in kinds if kind in _FORMS]
 
 
 def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
