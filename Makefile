@@ -59,9 +59,11 @@ tested: .venv/dev
 field: .venv/dev
 	$(BIN)/python -m continuum.kernels
 
-# the lessons with their pictures, and the site; open site/index.html
+# the lessons and the gallery with their pictures, and the site; open site/index.html
 docs: .venv/docs
 	$(BIN)/jupyter nbconvert --log-level WARN --execute --to notebook --output-dir out/notebooks notebooks/*.ipynb
+	mkdir -p out/gallery
+	cd out/gallery && for script in ../../docs/gallery/*.py; do ../../$(BIN)/python $$script || exit 1; done
 	$(BIN)/mkdocs build --strict
 
 # the oldest versions that pyproject.toml allows, in an environment of their own; they warn of newer ones they meet there

@@ -1,11 +1,12 @@
-"""Pages that the site makes of what is elsewhere: lessons of the notebooks, the reference of the packages."""
+"""Pages that the site makes of what is elsewhere: lessons of the notebooks, the gallery of its scripts, the reference of the packages."""
 
+import ast
+import base64
 import importlib
 import re
 from pathlib import Path
 
 import nbformat
-from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from nbconvert import MarkdownExporter
@@ -13,6 +14,9 @@ from nbconvert import MarkdownExporter
 ROOT = Path(__file__).parent.parent
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 EXECUTED = ROOT / "out" / "notebooks"  # where `make docs` runs them; without, a lesson has no pictures
+GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.py"))
+DRAWN = ROOT / "out" / "gallery"  # where `make docs` runs the scripts
+KATEX = ROOT / "docs" / "katex"  # draws the formulas in the browser
 PACKAGES = ("discs", "continuum", "compare")
 
 
@@ -34,13 +38,18 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, f"lessons/{path.name}", content=path.read_bytes()))
         for name, picture in pictures.items():
             files.append(File.generated(config, f"lessons/{name}", content=picture))
+    page, pictures = gallery()
+    files.append(File.generated(config, "gallery.md", content=page))
+    for name, picture in pictures.items():
+        files.append(File.generated(config, f"gallery/{name}", content=picture))
+    files.append(File.generated(config, "katex/katex.css", content=with_fonts((KATEX / "katex.min.css").read_text())))
     for name in (name for package in PACKAGES for name in modules(package)):
         files.append(File.generated(config, f"reference/{name}.md", content=reference(name)))
     return files
 
 
 def lesson(path: Path) -> tuple[str, dict[str, bytes]]:
-    """A notebook as Markdown, executed if it has been, with formulas as MathML, which needs no script; pictures by name."""
+    """A notebook as Markdown, executed if it has been; pictures by name."""
     notebook, executed = nbformat.read(path, as_version=4), EXECUTED / path.name
     if executed.exists() and sources(found := nbformat.read(executed, as_version=4)) == sources(notebook):
         notebook = found
@@ -48,12 +57,36 @@ def lesson(path: Path) -> tuple[str, dict[str, bytes]]:
         if cell.cell_type == "code":
             cell.outputs = [out for out in cell.outputs if out.get("name") != "stderr"]  # progress bars
         else:
-            cell.source = re.sub(r"\$\$(.+?)\$\$", lambda m: convert(m[1], display="block"), cell.source, flags=re.DOTALL)
             cell.source = re.sub(r"\]\(([\w-]+)\.ipynb\)", r"](\1.md)", cell.source)
-            # in a span: Markdown would take a line that begins with <math> for a block
-            cell.source = re.sub(r"\$(.+?)\$", lambda m: f"<span>{convert(m[1])}</span>", cell.source)
+            cell.source = re.sub(r"\s*(\$\$.+?\$\$)\s*", r"\n\n\1\n\n", cell.source, flags=re.DOTALL)  # a paragraph of its own
     body, resources = MarkdownExporter().from_notebook_node(notebook, {"output_files_dir": path.stem})
     return f"{body}\n\n[This page as a notebook]({path.name})\n", resources["outputs"]
+
+
+def gallery() -> tuple[str, dict[str, bytes]]:
+    """The page of the short scripts, each with its picture if it has been run; pictures by name."""
+    page, pictures = (ROOT / "docs" / "gallery" / "introduction.txt").read_text(encoding="utf-8"), {}
+    for path in GALLERY:
+        source = path.read_text(encoding="utf-8")
+        title, _, words = (ast.get_docstring(ast.parse(source)) or path.stem).partition(": ")
+        code = source.split('"""', 2)[2].strip()
+        page += f"\n## {title}\n\n{words}\n\n```python\n{code}\n```\n"
+        for drawn in sorted(DRAWN.glob(f"{path.stem}.*")):
+            pictures[drawn.name] = drawn.read_bytes()
+            page += f"\n![{title}](gallery/{drawn.name})\n"
+    return page, pictures
+
+
+def with_fonts(css: str) -> str:
+    """KaTeX's style sheet with its fonts inside, as some browsers read no fonts from files; without those that are not shipped."""
+
+    def face(found: re.Match[str]) -> str:
+        font = KATEX / "fonts" / found[2]
+        if not font.exists():
+            return ""
+        return f"{found[1]}url(data:font/woff2;base64,{base64.b64encode(font.read_bytes()).decode()}) format('woff2')}}"
+
+    return re.sub(r"(@font-face\{[^}]*?src:)url\(fonts/([\w-]+\.woff2)\)[^}]*\}", face, css)
 
 
 def sources(notebook: nbformat.NotebookNode) -> list[str]:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.discs.conftest import browser  # noqa: F401
+
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parent.parent
@@ -63,9 +65,47 @@ def test_reference_tells_parameters_shapes_and_errors(site):
 def test_lessons_are_pages_with_formulas_and_notebooks_to_take_away(site):
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         page = (site / "lessons" / f"{path.stem}.html").read_text(encoding="utf-8")
-        assert "<math" in page
+        assert 'class="arithmatex"' in page
         assert "$$" not in page
         assert (site / "lessons" / path.name).read_bytes() == path.read_bytes()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("width", [390, 1280])
+def test_formulas_are_drawn_on_pages_that_fit(site, browser, width):  # noqa: F811
+    browser.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride", {"width": width, "height": 844, "deviceScaleFactor": 1, "mobile": width < 500}
+    )
+    drawn = 0
+    for page in [*site.glob("*.html"), *site.glob("lessons/*.html")]:
+        if page.name == "404.html":  # has addresses of a server
+            continue
+        browser.get(page.as_uri())
+        formulas, done, errors, across = browser.execute_script(
+            "const all = s => [...document.querySelectorAll(s)];"
+            "return [all('.arithmatex').length, all('.arithmatex .katex-html').length, all('.katex-error').map(e => e.title),"
+            "document.documentElement.scrollWidth]"
+        )
+        assert (errors, done, browser.get_log("browser")) == ([], formulas, []), page.name
+        assert across <= width, page.name
+        drawn += formulas
+    assert drawn > 500
+
+
+@pytest.mark.long
+def test_search_finds_pages_that_are_opened_as_files(site, browser):  # noqa: F811
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    browser.set_window_size(1280, 900)
+    browser.get((site / "index.html").as_uri())
+    browser.find_element("css selector", ".md-search__form").click()
+    browser.find_element("css selector", ".md-search__input").send_keys("vakonomic")
+    browser.set_script_timeout(30)
+    found = browser.execute_async_script(
+        "const done = arguments[0]; const look = () => {"
+        "const hits = [...document.querySelectorAll('.md-search-result__link')].map(a => a.href);"
+        "hits.length ? done(hits) : setTimeout(look, 50)}; look()"
+    )
+    assert any("/vakonomic.html" in hit for hit in found)
 
 
 @pytest.fixture(scope="module")
