@@ -1,4 +1,4 @@
-"""Pages that the site makes of what is elsewhere: lessons of the notebooks, the gallery of its scripts, the reference of the packages."""
+"""Pages that the site makes of what is elsewhere: lessons of notebooks, the gallery of scripts, the reference of packages."""
 
 import ast
 import base64
