@@ -98,8 +98,10 @@ def solve(
     SimulationError : if the motion cannot continue; see `discs.simulate`.
     """
     if not isinstance(scene, Scene):
-        instead = "; simulate(problem) runs discs" if isinstance(scene, Problem) else ""
-        raise ValueError(f"solve takes a Scene, such as untwisting_rod(); got {type(scene).__name__}{instead}")
+        raise ValueError(
+            f"solve takes a Scene, such as untwisting_rod(); got {type(scene).__name__}"
+            + "; simulate(problem) runs discs" * isinstance(scene, Problem)
+        )
     fitting = ("elements",) if scene.steered else ("richardson", "leapfrog")
     if scene.rod.curvature == "linear" and not scene.steered:
         fitting = ("spectral", *fitting)

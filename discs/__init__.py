@@ -1,5 +1,6 @@
 """N rolling discs joined by springs: a finite-dimensional nonholonomic mechanical system."""
 
+from discs.beside import warn_of_others
 from discs.chains.chain import Chain, SteeredChain
 from discs.files.archive import load
 from discs.integrators import (
@@ -60,3 +61,5 @@ __all__ = [
     "steps",
     "suggest_dt",
 ]
+
+warn_of_others()

@@ -3,9 +3,10 @@
 import re
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
+
+nbformat = pytest.importorskip("nbformat", reason="needs the group pages")
+NotebookClient = pytest.importorskip("nbclient", reason="needs the group pages").NotebookClient
 
 NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
 SHORT = ("04-n-to-infinity",)  # of every package, run by `make test`

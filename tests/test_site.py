@@ -12,6 +12,7 @@ import pytest
 
 from tests.discs.conftest import browser  # noqa: F401
 
+pytest.importorskip("mkdocs", reason="needs the group docs")
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parent.parent

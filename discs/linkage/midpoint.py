@@ -11,7 +11,7 @@ and their links only (block-tridiagonal); it is taken by the complex step, a few
 quickly. Rigid links and wheels hold exactly at the ends of steps; w_1 = 2 w - w_0 obeys rigid links up to h^2.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
@@ -43,7 +43,8 @@ class Stepper:
 
     def __init__(self, of: Equations) -> None:
         self.of, self.solves, self.matrices = of, 0, 0
-        self._factors, self._for = None, 0.0
+        self._factors: Any = None  # of SuperLU
+        self._for = 0.0
         self._pattern()
 
     def _pattern(self) -> None:
@@ -121,7 +122,6 @@ class Stepper:
     def _newton(self, y: Float, z: Moment, h: float, rest: Float, slowest: float) -> Float | None:
         """The solution near y, or None if it was not reached."""
         of, last = self.of, np.inf
-        assert self._factors is not None
         for _ in range(SWEEPS):
             change = self._factors.solve(self.residual(y, z, h, rest))
             self.solves += 1
