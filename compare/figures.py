@@ -19,7 +19,7 @@ from discs.arrays import Float
 from discs.pictures import figures as of_discs
 from discs.pictures import geometry
 from discs.pictures.figures import given_or_new
-from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE
+from discs.pictures.style import BLUE, COORDINATE, ENDS, GREEN, GREY, INK, LABEL, LAW_COLOUR, METHOD, ORANGE, PURPLE, look
 
 KIND = {
     "springs": "plain springs",
@@ -44,7 +44,8 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
     ax.set_xscale("log")
     if any((s.error > 0).any() for s in studies):
         ax.set_yscale("log")  # an error of 0, as of a rod at rest, has no logarithm
-    for study, colour in zip(studies, (ORANGE, BLUE, GREEN, PURPLE), strict=False):
+    for study in studies:
+        colour = ENDS[study.ends]
         for j, (name, marker, line) in enumerate(zip(compared(study.scene), "os^d", ("-", "--", ":", "-."), strict=False)):
             label = f"{KIND[study.ends]}, {SYMBOL[name]}"
             ax.plot(study.n, study.error[:, j], marker=marker, linestyle=line, color=colour, label=label, markersize=5)
@@ -59,8 +60,11 @@ def convergence(studies: Sequence[Study], ax: Axes | None = None) -> Axes:
         where = ("left", "bottom") if beside > 1 else ("right", "top")  # on the side away from the curves
         ax.text(n[1], line[1], f"slope −{slope} ", color=GREY, ha=where[0], va=where[1])
     floor = max(s.floor for s in studies)
-    if floor > 0:
-        ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label="estimated error of the field")
+    least = min((s.error[s.error > 0].min() for s in studies if (s.error > 0).any()), default=0.0)
+    if floor > 0.01 * least:
+        ax.axhline(floor, color="black", linestyle=(0, (1, 2)), label=f"estimated error of the field, {floor:.1e}")
+    elif floor > 0:  # far below: a line there would press the curves together
+        ax.plot([], [], " ", label=f"estimated error of the field: {floor:.1e}")
     ticks = sorted({int(m) for s in studies for m in s.n})
     ax.set_xticks(ticks, minor=False)
     ax.xaxis.set_major_formatter(ScalarFormatter())
@@ -168,15 +172,17 @@ def laws(runs: dict[str, Solution], distance: Float, instants: int = 5) -> list[
     (first, a), (second, b) = runs.items()
     figure = Figure(figsize=(10.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for name, row, colour in zip(("x", "y", "theta"), distance, (ORANGE, BLUE, GREEN), strict=True):
-        left.plot(a.t, row, label=SYMBOL[name], color=colour)
+    for name, row in zip(("x", "y", "theta"), distance, strict=True):
+        left.plot(a.t, row, label=SYMBOL[name], color=COORDINATE[name])
     left.set_xlabel("time t")
     left.set_ylabel("largest distance (length, rad)")
     left.legend()
     frames = geometry.instants(a, instants)
     for f, shade in zip(frames, np.linspace(0.25, 1, frames.size), strict=True):
-        for run, law, colour, line in ((a, first, ORANGE, "-"), (b, second, BLUE, "--")):
-            right.plot(run.x[f], run.y[f], line, color=colour, alpha=shade, label=f"{law} law" if shade == 1 else None)
+        for run, law, line in ((a, first, "-"), (b, second, "--")):
+            right.plot(
+                run.x[f], run.y[f], line, color=LAW_COLOUR.get(law, GREEN), alpha=shade, label=f"{law} law" if shade == 1 else None
+            )
         right.annotate(f"t = {a.t[f]:.2g}", (a.x[f, -1], a.y[f, -1]), fontsize=8, textcoords="offset points", xytext=(4, 0))
     right.set_aspect("equal", adjustable="datalim")
     right.set_xlabel("x")
@@ -202,7 +208,8 @@ def _stage(ax: Axes3D, middle: Float, reach: float) -> None:
 def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
     """Energy against time, all runs in the same axes; the modified energy, if recorded, is dotted."""
     ax = given_or_new(ax, 7.6, 4.6)
-    for (label, run), colour in zip(runs.items(), (ORANGE, BLUE, GREEN, PURPLE), strict=False):
+    for label, run in runs.items():
+        colour = look(str(run.stats["method"]))["color"]
         ax.plot(run.t, run.energy, color=colour, label=label, linewidth=1)
         if run.modified_energy is not None:
             its = f"{label.split(',')[0]}: modified energy"
@@ -214,42 +221,30 @@ def energy(runs: dict[str, Solution], ax: Axes | None = None) -> Axes:
     return ax
 
 
-OURS = {"midpoint": BLUE, "suzuki4": ORANGE, "gauss4": "#56B4E9", "gauss6": GREEN, "gauss8": PURPLE, "auto": "black"}
-OURS |= {"radau3": "#F0E442", "radau5": "#A0522D"}
-
-
 def precision(study: WorkPrecision) -> list[Axes]:
-    """Error against time, log-log, a row of panels for each problem: our methods with thick lines and dots, in front; peers with
-    thin dashed ones, each with its colour and mark."""
+    """Error against time, log-log, a row of panels for each problem: our methods with thick solid lines, in front; peers with thin
+    dashed ones, each with its colour and mark."""
     names = list(dict.fromkeys(name for name, _ in study.problems))
     sizes = list(dict.fromkeys(n for _, n in study.problems))
     peers = list(dict.fromkeys(r.method for r in study.rows if not r.ours))
-    marks = dict(zip(peers, ("s", "D", "^", "v", "<", ">", "p", "*", "h", "X", "P", "d", "8", "H", "1", "2"), strict=False))
-    shade = {peer: colormaps["tab20b"](i / max(1, len(peers) - 1)) for i, peer in enumerate(peers)}
+    own = sorted({r.method for r in study.rows if r.ours}, key=[*METHOD].index)
     columns = len(sizes) if len(names) > 1 else min(len(sizes), 2)  # a single problem fills a page's width
     rows = -(-len(names) * len(sizes) // columns)
     figure = Figure(figsize=(1.5 + 3.3 * max(columns, 2), 1.8 + 3.4 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     shown: dict[str, Any] = {}
     for ax, (name, n) in zip(grid.ravel(), ((name, n) for name in names for n in sizes), strict=False):
-        for method in (*peers, *OURS):
+        for method in (*peers, *own):
             errors, seconds = study.curve(name, n, method)
-            if not errors.size:
-                continue
-            if method in OURS:
-                line = ax.loglog(seconds, errors, "o-", color=OURS[method], markersize=4, linewidth=1.6, zorder=3)[0]
-            else:
-                line = ax.loglog(
-                    seconds, errors, marks.get(method, "."), linestyle="--", color=shade[method], markersize=4, linewidth=0.8
-                )[0]
-            shown.setdefault(method, line)
+            if errors.size:
+                shown.setdefault(method, ax.loglog(seconds, errors, **look(method))[0])
         ax.set_title(f"{LAW.get(name, name)}, N = {n}", fontsize="medium")
         ax.grid(alpha=0.3)
     for ax in grid[-1]:
         ax.set_xlabel("processor time (s)")
     for ax in grid[:, 0]:
         ax.set_ylabel("relative error of x, y, θ")
-    order = [m for m in (*OURS, *peers) if m in shown]
+    order = [m for m in (*own, *peers) if m in shown]
     lines = [shown[m] for m in order]
     figure.legend(lines, order, loc="outside lower center", ncols=6 if columns > 2 else 4, fontsize="small", frameon=False)
     return list(grid.ravel())
@@ -266,12 +261,12 @@ def stability(size: str, drifts: dict[str, list[tuple[float, float, int]]], grow
     """
     figure = Figure(figsize=(11.5, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    colours = (BLUE, ORANGE, GREEN, PURPLE, "black", "#56B4E9", "#F0E442", "#A0522D", GREY)
-    for (method, points), colour in zip(drifts.items(), colours, strict=False):
+    for method, points in drifts.items():
+        line = look(method)
         multiple, drift, unconverged = np.array(points).T
         if np.isfinite(drift).any():
-            left.loglog(multiple, drift, "o-", color=colour, label=method, markersize=4)
-        left.loglog(multiple[unconverged > 0], drift[unconverged > 0], "x", color=colour, markersize=9)
+            left.loglog(multiple, drift, label=method, **line)
+        left.loglog(multiple[unconverged > 0], drift[unconverged > 0], "x", color=line["color"], markersize=9)
     left.set_xlabel("h/k")
     left.set_ylabel("relative error of the energy")
     left.set_title(f"paper's scene, {size}; × steps unconverged, no point: stopped", fontsize="medium")
@@ -281,7 +276,8 @@ def stability(size: str, drifts: dict[str, list[tuple[float, float, int]]], grow
     left.grid(alpha=0.3)
     if drifts:
         left.legend(fontsize=8, loc="upper left")
-    for (law, waves), colour, mark in zip(growth.items(), (ORANGE, BLUE), "os", strict=False):
+    for (law, waves), mark in zip(growth.items(), "os", strict=False):
+        colour = LAW_COLOUR.get(law, GREEN)
         right.plot(waves.q, waves.relation, "-", color=colour, label=f"{law} law, dispersion relation of 33 discs")
         right.plot(waves.q, waves.measured, mark, color=colour, markersize=4, label=f"{law} law, measured, midpoint")
     if growth:

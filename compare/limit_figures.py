@@ -44,7 +44,7 @@ def limits_of(study: Study, ax: Axes) -> None:
         ax.plot(study.n, error, marker="o", markersize=4, label=words, **style)
     n = study.n[[0, -1]].astype(float)
     slope = 4 if study.ends == "elements" else 1 if study.ends == "springs" and study.scene.rod.curvature == "linear" else 2
-    line = 0.5 * errors.min(axis=1)[0] * (n / n[0]) ** -slope
+    line = 0.4 * (errors * (study.n[:, None] / n[0]) ** slope).min() * (n / n[0]) ** -slope
     ax.plot(n, line, color=INK, linewidth=1)
     ax.text(n[1], line[1], f"slope −{slope}  ", ha="right", va="top")
     ax.set(xscale="log", yscale="log", xlabel="number of discs N")

@@ -21,7 +21,7 @@ from compare.study import apart, convergence
 from continuum import solve, steered_rod, untwisting_rod
 from discs import Gauss8, Solution, simulate
 from discs.arrays import Float
-from discs.pictures.style import BLUE, GREY, ORANGE
+from discs.pictures.style import BLUE, GREY, LAW_COLOUR, ORANGE
 
 SIZES = (17, 33, 65, 129, 257, 513)
 FAMILY = (10.0, 40.0, 160.0)
@@ -191,7 +191,7 @@ def _draw(studies: list[Study], unit: Distances, paper: list[Distances], reach: 
     kinds = [
         f"A = {a:g}, G = {g:g},\nJ = {j:.2g}" for a, g, j in zip(paper[0].stretch, paper[0].shear, paper[0].inertia, strict=True)
     ]
-    for d, colour, shift in zip(paper, (ORANGE, BLUE), (-0.18, 0.18), strict=True):
+    for d, colour, shift in zip(paper, (LAW_COLOUR["field"], LAW_COLOUR["unit"]), (-0.18, 0.18), strict=True):
         axes[1, 1].barh(
             np.arange(len(kinds)) + shift, np.hypot(d.distance[:, 0], d.distance[:, 1]), 0.34, color=colour, label=d.against
         )

@@ -18,7 +18,7 @@ from continuum.scenes import rolling_rod, untwisting_rod
 from discs import Midpoint, Suzuki4, simulate
 from discs.arrays import Float
 from discs.chains.rolling import ROLLING, stretching
-from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, SIGNED, UNSIGNED
+from discs.pictures.style import GREY, INK, LABEL, LAW_COLOUR, SIGNED, SKY, UNSIGNED
 
 FINE = Suzuki4(Midpoint(tolerance=1e-13))
 
@@ -65,11 +65,13 @@ def dispersion(rod: Rod, omega: float = 1.0, n: int = 32, modes: int = 12, ax: A
     most = 2 * np.pi * (modes + 0.5) / rod.length
     q, k = np.linspace(1e-3, most, 400), rod.length / n
     at = 2 * np.pi * np.arange(1, modes + 1) / rod.length
-    ax.plot(q, growth(rod, q, omega), color=BLUE, label="field law, field")
-    ax.plot(q, growth(rod, q, omega, k=k), color=ORANGE, linestyle="--", label=f"field law, {n} discs")
-    ax.plot(at, measured_growth(rod, omega, "field", n, modes), "o", color=ORANGE, markersize=5, label=f"measured, {n} discs")
-    ax.plot(q, growth(rod, q, omega, "unit"), color=GREEN, label="unit law, field and discs: 0")
-    ax.plot(at, measured_growth(rod, omega, "unit", n, modes), "s", color=GREEN, markersize=5, label=f"measured, {n} discs")
+    ax.plot(q, growth(rod, q, omega), color=LAW_COLOUR["field"], label="field law, field")
+    ax.plot(q, growth(rod, q, omega, k=k), color=SKY, linestyle="--", label=f"field law, {n} discs")
+    ax.plot(at, measured_growth(rod, omega, "field", n, modes), "o", color=SKY, markersize=5, label=f"measured, {n} discs")
+    ax.plot(q, growth(rod, q, omega, "unit"), color=LAW_COLOUR["unit"], label="unit law, field and discs: 0")
+    ax.plot(
+        at, measured_growth(rod, omega, "unit", n, modes), "s", color=LAW_COLOUR["unit"], markersize=5, label=f"measured, {n} discs"
+    )
     p = rod.uniform("dispersion")
     limit = omega * np.sqrt(p.torsion_stiffness / p.bending_stiffness)
     ax.axhline(limit, color=GREY, linewidth=1, linestyle=(0, (1, 2)))

@@ -136,6 +136,7 @@ def readily() -> Iterator[None]:
 @contextmanager
 def _refusing() -> Iterator[None]:
     """Within it numba compiles no kernel in this thread: it raises `NotReady`."""
+    import numba  # noqa: F401  # whole: its parts are unfinished while another thread imports it
     from numba.core import event
 
     here = threading.get_ident()

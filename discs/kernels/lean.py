@@ -26,6 +26,7 @@ def is_part(library: Any) -> bool:
 @contextmanager
 def lean() -> Iterator[None]:
     """Within it numba compiles in this way, in this thread."""
+    import numba  # noqa: F401  # whole: its parts are unfinished while another thread imports it
     from numba.core import codegen, targetconfig
     from numba.core.typing import templates
 

@@ -15,7 +15,7 @@ from discs.files import schema
 from discs.mechanics import Trajectory
 from discs.mechanics.vakonomic import of_chain, rolling_disc, solve
 from discs.pictures import geometry, trajectories
-from discs.pictures.style import BLUE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED, UNSIGNED
+from discs.pictures.style import BLUE, COORDINATE, GREEN, GREY, INK, LABEL, ORANGE, PURPLE, SIGNED, UNSIGNED
 from discs.problem import Problem, State
 from discs.solution import Result, Solution
 
@@ -153,8 +153,8 @@ def spacetime(run: Solution, name: str = "omega", ax: Axes | None = None) -> Axe
 def end_disc(run: Solution, ax: Axes | None = None) -> Axes:
     """Position and roll angle of the first disc against time."""
     ax = given_or_new(ax, 5.4, 4.0)
-    for name, symbol, colour, line in (("x", "x", BLUE, "-"), ("y", "y", ORANGE, "--"), ("theta", "θ", GREEN, "-.")):
-        ax.plot(run.t, getattr(run, name)[:, 0], line, color=colour, label=symbol)
+    for name, symbol, line in (("x", "x", "-"), ("y", "y", "--"), ("theta", "θ", "-.")):
+        ax.plot(run.t, getattr(run, name)[:, 0], line, color=COORDINATE[name], label=symbol)
     ax.set_xlabel(LABEL["t"])
     ax.set_ylabel("x, y (length), θ (rad)")
     ax.set_title(f"disc at s = {run.s[0]:g}", fontsize="medium")

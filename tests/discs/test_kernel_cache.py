@@ -109,3 +109,36 @@ def test_kernels_of_gradients_are_compiled_ahead(monkeypatch, law, names):
     assert not prepared
     ahead.compile_for(law, "few", tested=False)
     assert sorted(prepared, reverse=True) == names
+
+
+STARTS_AT_ONCE = """
+import threading
+import time
+
+from discs.kernels.lean import lean
+
+failed = []
+
+
+def start(number):
+    time.sleep(0.05 * number)
+    try:
+        with lean():
+            pass
+    except BaseException as error:
+        failed.append(repr(error))
+
+
+threads = [threading.Thread(target=start, args=(number,)) for number in range(4)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+assert not failed, failed
+"""
+
+
+@pytest.mark.slow
+def test_threads_may_be_the_first_to_import_numba():
+    done = subprocess.run([sys.executable, "-c", STARTS_AT_ONCE], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
