@@ -3,9 +3,9 @@
     python -m tests.mutants --seed 1 --each 10        # ten of every place of PLACES, drawn by the seed
     python -m tests.mutants --only loads --each 30
 
-Not part of the tests: it takes a minute for a mutant. Files are changed in place, one line at a time, and restored; the checkout must be
-clean. Kernels run as plain Python (NUMBA_DISABLE_JIT=1), so nothing compiles. A mutant is killed when a test fails or takes four times as
-long as without it. Survivors are printed as a table, to be explained, or killed by a new test.
+Not part of the tests: it takes a minute for a mutant. Files are changed in place, one line at a time, and restored; the checkout
+must be clean. Kernels run as plain Python (NUMBA_DISABLE_JIT=1), so nothing compiles. A mutant is killed when a test fails or takes
+four times as long as without it. Survivors are printed as a table, to be explained, or killed by a new test.
 """
 
 import argparse
@@ -42,12 +42,15 @@ PLACES = {
     ),
     "integrators": Place("discs/integrators/*.py", f"{D}integrators.py {D}radau.py {D}dop853.py {D}step.py"),
     "kernels": Place(
-        "discs/kernels/slaved*.py discs/kernels/steered*.py discs/kernels/banded.py", f"{D}kernels.py {D}simulate.py", plain=True
+        "discs/kernels/slaved*.py discs/kernels/steered*.py discs/kernels/banded.py",
+        f"{D}kernels.py {D}simulate.py",
+        plain=True,
     ),
     "solver": Place("continuum/*.py", f"{C}spectral.py {C}solve.py {C}exact.py {C}steered.py {C}ground.py"),
     "archives": Place("discs/files/*.py", f"{D}archive.py {D}files.py {D}untrusted.py {D}restart.py {D}finishing.py"),
     "sweeps": Place(
-        "compare/sweeps.py compare/lump.py compare/study.py", "tests/compare/test_sweeps.py tests/compare/test_convergence.py"
+        "compare/sweeps.py compare/lump.py compare/study.py",
+        "tests/compare/test_sweeps.py tests/compare/test_convergence.py",
     ),
     "loads": Place("discs/loads/*.py", f"{D}loads.py {D}loads_known.py {D}nonlinear.py {D}motors.py {D}signals.py {D}bends.py"),
 }
