@@ -48,6 +48,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Links to notebooks lead to the pages of the lessons."""
+    return re.sub(r"\]\(\.\./notebooks/([\w-]+)\.ipynb\)", r"](lessons/\1.md)", markdown)
+
+
 def lesson(path: Path) -> tuple[str, dict[str, bytes]]:
     """A notebook as Markdown, executed if it has been; pictures by name."""
     notebook, executed = nbformat.read(path, as_version=4), EXECUTED / path.name
