@@ -1,6 +1,7 @@
 """Convergence of N discs to the rod: lumping, studies of N -> infinity, pictures."""
 
 from compare.hardcases.table import Stability, stability
+from compare.lab import lab
 from compare.lump import lump
 from compare.main_job import overview
 from compare.precision import work_precision
@@ -9,4 +10,4 @@ from compare.study import convergence
 from compare.sweeps import sweep
 from compare.work_precision import WorkPrecision
 
-__all__ = ["Stability", "Study", "WorkPrecision", "convergence", "lump", "overview", "stability", "sweep", "work_precision"]
+__all__ = ["Stability", "Study", "WorkPrecision", "convergence", "lab", "lump", "overview", "stability", "sweep", "work_precision"]

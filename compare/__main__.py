@@ -8,6 +8,7 @@ from compare import load_limits, main_page, precision, report, slip
 from compare.background import background
 from compare.hardcases.table import Stability, kept, stability
 from compare.help import COMMANDS
+from compare.lab import command as lab_command
 from compare.limits import limits
 from compare.main_job import SIZES, overview, summary
 from compare.outputs import fresh_files
@@ -57,7 +58,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--quiet", action="store_true", help="no progress bars")
     p.set_defaults(run=run_main_job)
     commands = p.add_subparsers(metavar="COMMAND", title="commands (without one: the comparison above)")
-    options = add_precision, add_stability, add_trust, add_loads, add_slip, add_report
+    options = lab_command.add_options, add_precision, add_stability, add_trust, add_loads, add_slip, add_report
     for add, (name, (short, says, example)) in zip(options, COMMANDS.items(), strict=True):
         add(commands.add_parser(name, help=short, description=says, epilog=f"example: python -m compare {name} {example}"))
     return p

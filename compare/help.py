@@ -1,6 +1,13 @@
 """Help of the commands of `python -m compare`: in a few words, in sentences with the files written, and options of an example."""
 
 COMMANDS = {
+    "lab": (
+        "a page to play with: discs that move as you change them",
+        "Open the lab in a browser: a live simulation in three dimensions. Choose the scene, the number of discs, the law and the "
+        "method, move sliders, pull, kick or hold a disc, and see the field beside the discs. It runs on this machine only and "
+        "needs no network. It ends when its page is closed, or by Ctrl-C.",
+        "--n 64",
+    ),
     "precision": (
         "speed against error beside other integrators",
         "Measure processor time against error of our methods and of other integrators on the same problem. Written: a table of all "

@@ -60,7 +60,8 @@ def read_scene(path: str | Path) -> Scene:
     for key, value in content.items():
         if key in PARAMETERS and isinstance(value, dict):
             content[key] = named(key, value, parameters.NAMES, folder)
-    return replace(make(**content), loads=tuple(load_of(load, folder) for load in loads))
+    scene = make(**content)
+    return replace(scene, loads=scene.loads + tuple(load_of(load, folder) for load in loads))
 
 
 def _toml(path: str | Path, content: bytes) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from discs.linkage.motion import run as linkage_run
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.doubt import doubted
-from discs.running.engine import WAITING, Overtaken, plain_because
+from discs.running.engine import WAITING, Overtaken, plain_because, refuse_loads
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
 from discs.running.moments import Event, checked_events, look_ahead
 from discs.running.progress import NO_BAR, Progress
@@ -221,13 +221,7 @@ def _run(
     if end / h > MOST_STEPS:
         raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")
     system = problem.system
-    if not integrator.takes_loads and not problem.conserves:
-        raise ValueError(
-            f"{integrator.name!r} takes loads that are part of the energy only, as Slope, Spring, or Rest without a signal; take a "
-            "method that takes all, as 'midpoint'"
-        )
-    if system.load is not None and system.load.axles and not integrator.takes_motors:
-        raise ValueError(f"{integrator.name!r} does not take motors; take an implicit method with fixed steps, as 'midpoint'")
+    refuse_loads(problem, integrator)
     offered = set(want) & set(integrator.offers)
     if offered and not system.quadratic:
         raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")

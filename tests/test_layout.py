@@ -20,7 +20,7 @@ FACADES = {
 # A link law takes a chain, which finds the law by its name: only the type is imported.
 FACADES |= {f"discs.chains.links.{law}": ("discs.chains.chain",) for law in ("law", "linear", "true")}
 # What is slow to import, or an extra: functions import it when they need it.
-LATE = ("discs.kernels", "continuum.kernels", "compare.peers", "compare.figures", "compare.limit_figures")  # with matplotlib
+LATE = ("discs.kernels", "continuum.kernels", "compare.peers", "compare.figures", "compare.limit_figures", "compare.lab")
 
 
 @cache

@@ -110,7 +110,7 @@ def view(
         "TITLE": html.escape(" and ".join(titles)).encode("ascii", "xmlcharrefreplace").decode("ascii"),
         "DATA": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
         "STYLE": _data_file("view.css"),
-        "SCRIPT": _data_file("view.js"),
+        "SCRIPT": _data_file("stage.js") + _data_file("view.js"),
         "THREE": _data_file("three.min.js"),
     }
     parts["POLICY"] = (

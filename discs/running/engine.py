@@ -13,6 +13,17 @@ class Overtaken(Exception):
     """The kernels of a plain run are there."""
 
 
+def refuse_loads(problem: Problem, integrator: Integrator) -> None:
+    """ValueError for loads that the method cannot take."""
+    if not integrator.takes_loads and not problem.conserves:
+        raise ValueError(
+            f"{integrator.name!r} takes loads that are part of the energy only, as Slope, Spring, or Rest without a signal; take a "
+            "method that takes all, as 'midpoint'"
+        )
+    if problem.system.load is not None and problem.system.load.axles and not integrator.takes_motors:
+        raise ValueError(f"{integrator.name!r} does not take motors; take an implicit method with fixed steps, as 'midpoint'")
+
+
 def plain_because(problem: Problem, integrator: Integrator, engine: str, want: tuple[str, ...]) -> str:
     """Why a run takes the plain engine, for `stats`; empty if it is compiled. ValueError for an unknown engine."""
     if checks.choice("engine", engine, ENGINES) == "plain":

@@ -19,7 +19,7 @@ from discs.integrators import Integrator, Work, find
 from discs.integrators.work import Frame
 from discs.kernels.background import usual
 from discs.problem import Problem, State
-from discs.running.engine import plain_because
+from discs.running.engine import plain_because, refuse_loads
 from discs.running.frames import ROUNDING, asked, steps_before
 from discs.running.ready import kernels
 from discs.running.suggest import suggest_dt
@@ -38,6 +38,7 @@ class Moment:
     t : time.
     x, y, theta, omega, x_rate, y_rate : (n,), as in `Solution`. phi, phi_rate : (n,), own headings; None of other discs.
     energy : kinetic and potential energy.
+    work, dissipated : work of loads that are not part of the energy, and energy that dampers took, both since the start.
     slope : (2, n), headings r' of the centre line, no unit, or (cos phi, sin phi).
     contact_force : (2, n), force of the ground on each disc.
     problem : of the run.
@@ -47,6 +48,8 @@ class Moment:
     def __init__(self, march: March, frame: Frame, t: float) -> None:
         self._march, self._frame, self.t, self.problem = march, frame, t, march.problem
         self.x_rate, self.y_rate = frame.rate[0], frame.rate[1]
+        if (load := march.system.load) is not None and not load.conservative:
+            self._seen  # noqa: B018  # now, as work and dissipation are sums over the steps up to now
 
     @cached_property
     def _seen(self) -> dict[str, Any]:
@@ -79,6 +82,14 @@ class Moment:
     @property
     def energy(self) -> float:
         return float(self._seen["energy"])
+
+    @property
+    def work(self) -> float:
+        return float(self._seen.get("balance", (0.0, 0.0))[0])
+
+    @property
+    def dissipated(self) -> float:
+        return float(self._seen.get("balance", (0.0, 0.0))[1])
 
     @property
     def slope(self) -> Float:
@@ -114,6 +125,7 @@ def by_steps(problem: Problem, integrator: Integrator, dt: float | None, engine:
             f"a run by steps, or with events, needs a method with fixed steps, as 'midpoint' or 'gauss6'; {integrator.name!r} "
             "chooses its own"
         )
+    refuse_loads(problem, integrator)
     because = plain_because(problem, integrator, engine := engine or usual(), ())
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration:

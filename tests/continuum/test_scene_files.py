@@ -150,3 +150,13 @@ def test_what_is_no_file_is_refused_at_once(tmp_path):
         read_scene(tmp_path)
     with pytest.raises(ValueError, match="cannot be read: No such file"):
         read_scene(tmp_path / "missing.toml")
+
+
+def test_loads_of_a_file_come_besides_those_of_its_scene(tmp_path):
+    """A rod with a mounting angle has a rest shape, with and without further loads."""
+    path = tmp_path / "scene.toml"
+    path.write_text('scene = "steered_rod"\nmounting_angle = 0.4\n', encoding="utf-8")
+    assert [load.mounting_angle for load in read_scene(path).loads] == [0.4]
+    path.write_text('scene = "steered_rod"\nmounting_angle = 0.4\n[[loads]]\nload = "Damping"\nrolling = 0.1\n', encoding="utf-8")
+    rest, damping = read_scene(path).loads
+    assert (rest.mounting_angle, damping.rolling) == (0.4, 0.1)

@@ -1,5 +1,6 @@
 """Events, and runs step by step."""
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.integrate import quad
 
 from discs import Chain, Problem, State, first_slip, load, simulate, steps
 from discs.events import FrictionExceeded, Line, Moment, Touch
+from discs.loads import Damping, Torque
 from tests.conftest import Model, uneven
 from tests.discs.test_view import pair
 
@@ -166,3 +168,20 @@ def test_a_moment_says_what_it_is():
     assert isinstance(now, Moment)
     assert repr(now) == "Moment(t = 0, 5 discs)"
     assert now.phi is None
+
+
+def test_moments_know_work_and_dissipation():
+    """Each moment has the sums up to its own time, also when it is asked later; those of a run with the same steps."""
+    problem = replace(uneven(6, Model("springs", "field")), loads=(Damping(rolling=0.3), Torque(0.2, at=0.0)))
+    run = simulate(problem, dt=0.1, frames=11, engine="plain", progress=False)
+    moments = list(steps(problem, dt=0.1, engine="plain"))
+    np.testing.assert_allclose([now.work for now in moments], run.work, atol=1e-13)
+    np.testing.assert_allclose([now.dissipated for now in moments], run.dissipated, atol=1e-13)
+    assert run.dissipated[-1] > 0.01
+    assert [now.work for now in islice(steps(replace(problem, loads=()), dt=0.1, engine="plain"), 2)] == [0.0, 0.0]
+
+
+def test_steps_refuse_loads_that_a_method_does_not_take():
+    problem = replace(uneven(6, Model("springs", "field")), loads=(Damping(rolling=0.3),))
+    with pytest.raises(ValueError, match="'leapfrog' takes loads that are part of the energy only"):
+        next(steps(problem, "leapfrog", dt=0.001))

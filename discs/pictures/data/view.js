@@ -1,10 +1,9 @@
 "use strict";
-// Discs in three dimensions: z is up, the plane is z = 0; d_1 along the axle, the spoke d_3 = cos(theta) e_z + sin(theta) J d_1.
+// The page of a run; stage.js before it draws the discs.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const at = (id) => document.getElementById(id);
-  const stage = at("stage"), scrub = at("scrub");
-  const R = data.radius;
+  const element = at("stage"), scrub = at("scrub");
   const tone = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); // a colour of view.css
   const kinds = ["first", "second"];
   const runs = data.runs.map((run) => ({ ...run, ...unpack(run.arrays) }));
@@ -22,153 +21,39 @@
   function largest(values, start) { let m = start; for (const v of values) m = Math.max(m, v); return m; }
   function smallest(values, start) { let m = start; for (const v of values) m = Math.min(m, v); return m; }
 
-  // ---- colour: the same scale for both runs
-  const scales = {};
-  for (const name of ["theta", "omega", "stretch", "force"]) {
-    if (!runs.every((run) => run[name])) continue;
-    const signed = name === "theta" || name === "omega";
-    let high = Math.max(...runs.map((run) => largest(run[name], -Infinity)));
-    let low = Math.min(...runs.map((run) => smallest(run[name], Infinity)));
-    if (signed) { high = Math.max(high, -low) || 1; low = -high; }
-    if (high - low < 1e-6 * Math.abs(high) + 1e-30) { low -= 0.5; high += 0.5; }
-    scales[name] = { low, high, stops: (signed ? data.style.signed : data.style.unsigned).map((c) => new THREE.Color(c)) };
-    at("colour").add(new Option(data.label[name], name));
-  }
-  // at first by the rates, unless all discs are at rest then
-  at("colour").value = runs.some((run) => run.omega.subarray(0, run.n).some((value) => value)) ? "omega" : "theta";
-  const mixed = new THREE.Color();
-  function colour(scale, value) {
-    const p = Math.min(Math.max((value - scale.low) / (scale.high - scale.low), 0), 1) * (scale.stops.length - 1);
-    const i = Math.min(Math.floor(p), scale.stops.length - 2);
-    return mixed.copy(scale.stops[i]).lerp(scale.stops[i + 1], p - i);
-  }
-
-  // ---- the stage: one canvas, a strip of it for each run, one camera
-  let renderer;
+  // ---- the stage, with a view of all the motion: some of its places
+  let stage;
   try {
-    renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    stage = makeStage({ element, count: runs.length, radius: data.radius, style: data.style, tone });
   } catch (error) {
     at("note").textContent = "This browser shows no WebGL, which the discs are drawn with.";
     return;
   }
-  renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-  renderer.setScissorTest(true);
-  renderer.domElement.setAttribute("aria-hidden", "true");
-  stage.prepend(renderer.domElement);
-  const low = [0, 1].map((j) => Math.min(...runs.map((run) => smallest(j ? run.y : run.x, Infinity))) - 1.1 * R);
-  const high = [0, 1].map((j) => Math.max(...runs.map((run) => largest(j ? run.y : run.x, -Infinity))) + 1.1 * R);
-  const middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
-  const reach = Math.hypot(high[0] - low[0], high[1] - low[1]) / 2;
-  const places = runs.flatMap((run) => { // some of the motion, what a view of all of it must show
+  stage.show(runs.flatMap((run) => {
     const every = Math.ceil(run.x.length / 300), picked = Array.from(run.x.keys()).filter((p) => p % every === 0);
-    return picked.flatMap((p) => [-1, 1].flatMap((side) => [[side, 0, 0], [0, side, 0], [0, 0, 1 + side]].map(([a, b, c]) => new THREE.Vector3(run.x[p] + a * R, run.y[p] + b * R, c * R))));
-  });
-  const camera = new THREE.PerspectiveCamera(30, 1, reach / 100, 100 * reach);
-  camera.up.set(0, 0, 1);
-  const orbit = new THREE.OrbitControls(camera, renderer.domElement);
-  orbit.maxPolarAngle = Math.PI / 2 - 0.02;
-
-  // ---- panels side by side or, on a tall stage, one above the other: [left, top, width, height] in pixels
-  function panel(j) {
-    const width = stage.clientWidth, height = stage.clientHeight, tall = height > width, count = runs.length;
-    return tall ? [0, j * height / count, width, height / count] : [j * width / count, 0, width / count, height];
-  }
-  function toward(a, e) { return new THREE.Vector3(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)); }
-  // the distance from which all the motion is seen along a direction, the point looked at, and the share of the height it fills
-  function fitted(a, e) {
-    const [, , width, height] = panel(0), back = toward(a, e), right = new THREE.Vector3(-Math.sin(a), Math.cos(a), 0);
-    const up = back.clone().cross(right), v = 0.85 * Math.tan(Math.PI / 12), h = v * width / height; // a margin, for titles
-    const target = new THREE.Vector3(middle[0], middle[1], R);
-    let far = 0, sizes;
-    for (let round = 0; round < 8; round++) {
-      const seen = places.map((c) => c.clone().sub(target)).map((c) => [c.dot(right), c.dot(up), c.dot(back)]);
-      far = Math.max(...seen.map(([x, y, z]) => z + Math.max(Math.abs(x) / h, Math.abs(y) / v)));
-      sizes = [0, 1].map((k) => seen.map((c) => c[k] / (far - c[2])));
-      [right, up].forEach((axis, k) => target.addScaledVector(axis, 0.5 * far * (Math.max(...sizes[k]) + Math.min(...sizes[k]))));
-    }
-    target.addScaledVector(up, 0.1 * far * v); // room for titles
-    const [x, y] = sizes.map((of) => Math.max(...of) - Math.min(...of));
-    return { far, target, back, filled: x * y };
-  }
-  let moved = false; // by the reader: then a new size of the window leaves the direction
-  function home() {
-    const tall = panel(0)[3] > panel(0)[2];
-    const best = (tall ? [[-1.05, 0.5], [-0.5, 0.7], [-0.2, 0.8], [-1.4, 0.9]] : [[-1.05, 0.5]]).map(([a, e]) => fitted(a, e))
-      .reduce((one, other) => (other.filled > one.filled ? other : one));
-    orbit.target.copy(best.target);
-    camera.position.copy(best.target).addScaledVector(best.back, best.far);
-    orbit.update();
-    moved = false;
-  }
-  function turn(a, e, near) { // by keys
-    const from = camera.position.clone().sub(orbit.target), far = from.length();
-    const now = [Math.atan2(from.y, from.x) + a, Math.min(Math.max(Math.asin(from.z / far) + e, 0.02), 1.55)];
-    camera.position.copy(orbit.target).addScaledVector(toward(...now), far * near);
-    orbit.update();
-    moved = stale = true;
-  }
-
-  function bar(length, width, thick, angle) { // from the hub, lying in the disc's plane; the disc's axle is the x axis, z is up
-    return new THREE.BoxGeometry(thick, width, length).translate(0, 0, length / 2).rotateX(-angle);
-  }
-  const thick = 0.05 * R;
-  const rim = new THREE.TorusGeometry(R, 0.022 * R, 6, 48).rotateY(Math.PI / 2);
-  const shapes = {
-    disc: new THREE.CylinderGeometry(R, R, thick, 48).rotateZ(Math.PI / 2),
-    cross: THREE.mergeGeometries([rim, ...[1, 2, 3].map((j) => bar(0.97 * R, 0.05 * R, 1.5 * thick, j * Math.PI / 2))]),
-    mark: THREE.mergeGeometries([bar(0.97 * R, 0.15 * R, 1.9 * thick, 0), new THREE.CylinderGeometry(0.12 * R, 0.12 * R, 2.2 * thick, 20).rotateZ(Math.PI / 2)]),
-    rod: new THREE.CylinderGeometry(0.07 * R, 0.07 * R, 1, 12).rotateZ(Math.PI / 2),
-  };
-
-  function many(scene, shape, material, count) {
-    const mesh = new THREE.InstancedMesh(shape, material, count);
-    mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
-    mesh.frustumCulled = false;
-    scene.add(mesh);
-    return mesh;
-  }
-
-  function build(run) {
-    const scene = new THREE.Scene();
-    scene.add(new THREE.AmbientLight("#ffffff", 2.2));
-    const sun = new THREE.DirectionalLight("#ffffff", 1.4);
-    sun.position.set(1, -2, 3);
-    scene.add(sun);
-    const round = 10 ** Math.floor(Math.log10(reach / 3)), step = [1, 2, 5, 10].map((m) => m * round).find((s) => s >= reach / 6);
-    const cells = 2 * Math.ceil(1.5 * reach / step);
-    const grid = new THREE.GridHelper(cells * step, cells).rotateX(Math.PI / 2);
-    grid.position.set(Math.round(middle[0] / step) * step, Math.round(middle[1] / step) * step, -0.002 * R);
-    scene.add(grid);
-    grid.material.vertexColors = false;
-    const dark = new THREE.MeshLambertMaterial({ color: data.style.ink });
-    const parts = {
-      disc: many(scene, shapes.disc, new THREE.MeshLambertMaterial(), run.n),
-      cross: many(scene, shapes.cross, dark, run.n),
-      mark: many(scene, shapes.mark, dark, run.n),
-      rod: many(scene, shapes.rod, new THREE.MeshLambertMaterial(), run.n - 1 + run.ring),
-    };
-    // tracks: for each step of time one short line a disc, so that the first so many are those up to now
+    const ends = [run.x, run.y].flatMap((values) => [smallest, largest].map((of) => values.indexOf(of(values, values[0]))));
+    return [...picked, ...ends].map((p) => [run.x[p], run.y[p]]);
+  }));
+  const panels = runs.map((run) => ({ run, ...stage.build(run.n, run.ring, tracks(run)) }));
+  function tracks(run) { // for each step of time one short line a disc, so that the first so many are those up to now
     const F = run.t.length, n = run.n, lines = new Float32Array(6 * n * Math.max(F - 1, 0));
     for (let f = 0, p = 0; f < F - 1; f++)
       for (let i = 0; i < n; i++)
-        for (const g of [f, f + 1]) { lines[p++] = run.x[g * n + i]; lines[p++] = run.y[g * n + i]; lines[p++] = 0.004 * R; }
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(lines, 3));
-    const tracks = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 }));
-    tracks.frustumCulled = false;
-    scene.add(tracks);
-    return { run, scene, parts, tracks, grid };
+        for (const g of [f, f + 1]) { lines[p++] = run.x[g * n + i]; lines[p++] = run.y[g * n + i]; lines[p++] = 0.004 * data.radius; }
+    return lines;
   }
-  const panels = runs.map(build);
-  function paint() { // in the colours of the light or the dark page
-    renderer.setClearColor(tone("back"));
-    for (const { grid, tracks, parts } of panels) {
-      grid.material.color.set(tone("grid"));
-      tracks.material.color.set(tone("track"));
-      parts.rod.material.color.set(tone("rod"));
-    }
-    stale = true;
+
+  // ---- colour: the same scale for both runs
+  const scales = {};
+  for (const name of ["theta", "omega", "stretch", "force"]) {
+    if (!runs.every((run) => run[name])) continue;
+    const high = Math.max(...runs.map((run) => largest(run[name], -Infinity)));
+    const low = Math.min(...runs.map((run) => smallest(run[name], Infinity)));
+    scales[name] = stage.scale(name, low, high);
+    at("colour").add(new Option(data.label[name], name));
   }
+  // at first by the rates, unless all discs are at rest then
+  at("colour").value = runs.some((run) => run.omega.subarray(0, run.n).some((value) => value)) ? "omega" : "theta";
 
   // ---- a frame: linear between the two recorded ones, or the one before where they are too far apart for that
   function place({ t, held }, time) {
@@ -177,31 +62,13 @@
     const share = high > low ? (time - t[low]) / (t[high] - t[low]) : 0;
     return [low, high, held ? Number(share >= 1) : Math.min(Math.max(share, 0), 1)];
   }
-  const matrix = new THREE.Matrix4(), e1 = new THREE.Vector3(), e2 = new THREE.Vector3(), e3 = new THREE.Vector3();
-  function pose({ run, parts, tracks, when }, time) {
-    const n = run.n, [f, g, share] = place(run, time), scale = scales[at("colour").value];
+  function pose(each, time) {
+    const { run, tracks, when } = each, n = run.n, [f, g, share] = place(run, time), tinted = at("colour").value;
     const shown = (1 - share) * run.t[f] + share * run.t[g];
     when.textContent = Math.abs(shown - time) > 1e-9 * (end - start) ? `shown at t = ${shown.toFixed(2)}` : "";
-    const now = (values, i) => (1 - share) * values[f * n + i] + share * values[g * n + i];
-    for (let i = 0; i < n; i++) {
-      const x = now(run.x, i), y = now(run.y, i), axle = now(run.axle, i), theta = now(run.theta, i);
-      e1.set(Math.cos(axle), Math.sin(axle), 0);
-      e3.set(-Math.sin(axle) * Math.sin(theta), Math.cos(axle) * Math.sin(theta), Math.cos(theta));
-      e2.crossVectors(e3, e1);
-      matrix.makeBasis(e1, e2, e3).setPosition(x, y, R);
-      for (const name of ["disc", "cross", "mark"]) parts[name].setMatrixAt(i, matrix);
-      parts.disc.setColorAt(i, colour(scale, now(run[at("colour").value], i)));
-    }
-    for (let i = 0; i < parts.rod.count; i++) {
-      const j = (i + 1) % n, x = now(run.x, i), y = now(run.y, i), dx = now(run.x, j) - x, dy = now(run.y, j) - y;
-      const length = Math.hypot(dx, dy) || 1e-9;
-      e1.set(dx, dy, 0);
-      e2.set(-dy / length, dx / length, 0);
-      e3.set(0, 0, 1);
-      parts.rod.setMatrixAt(i, matrix.makeBasis(e1, e2, e3).setPosition(x + dx / 2, y + dy / 2, R));
-    }
-    for (const part of Object.values(parts)) part.instanceMatrix.needsUpdate = true;
-    parts.disc.instanceColor.needsUpdate = true;
+    const now = (name) => (i) => (1 - share) * run[name][f * n + i] + share * run[name][g * n + i];
+    const value = now(tinted);
+    stage.pose(each, { x: now("x"), y: now("y"), axle: now("axle"), theta: now("theta"), tint: (i) => stage.colour(scales[tinted], value(i)) });
     tracks.geometry.setDrawRange(0, run.held ? 0 : 2 * n * (time >= run.t.at(-1) ? run.t.length - 1 : f));
   }
 
@@ -230,9 +97,9 @@
   }
 
   // ---- time
-  let now = start, playing = false, last = 0, stale = true;
+  let now = start, playing = false, last = 0;
   scrub.min = start; scrub.max = end;
-  function go(time) { now = Math.min(Math.max(time, start), end); stale = true; }
+  function go(time) { now = Math.min(Math.max(time, start), end); stage.stale = true; }
   function play(on) {
     playing = on;
     if (on && now >= end) go(start);
@@ -247,32 +114,24 @@
   }
 
   function resize() {
-    renderer.setSize(stage.clientWidth, stage.clientHeight, false);
-    const [, , width, height] = panel(0);
-    camera.aspect = width / height;
-    camera.updateProjectionMatrix();
     panels.forEach(({ title }, j) => {
-      const [left, top, width] = panel(j);
+      const [left, top, width] = stage.panel(j);
       Object.assign(title.style, { left: `${left}px`, top: `${top}px`, width: `${width}px` });
       if (j) Object.assign(title.style, { borderLeftWidth: left ? "1px" : 0, borderTopWidth: top ? "1px" : 0 });
     });
-    if (!moved) home();
-    stale = true;
+    stage.resize();
   }
 
   function legend() {
-    const name = at("colour").value, scale = scales[name], pen = at("scale").getContext("2d");
-    for (let i = 0; i < 220; i++) {
-      pen.fillStyle = `#${colour(scale, scale.low + (scale.high - scale.low) * i / 219).getHexString()}`;
-      pen.fillRect(i, 0, 1, 12);
-    }
+    const name = at("colour").value, scale = scales[name];
+    stage.legend(at("scale"), scale);
     at("what").textContent = data.label[name];
     at("ends").replaceChildren(...[scale.low, (scale.low + scale.high) / 2, scale.high].map((v) => {
       const text = document.createElement("span");
       text.textContent = v.toPrecision(3);
       return text;
     }));
-    stale = true;
+    stage.stale = true;
   }
 
   function draw(clock) {
@@ -282,18 +141,13 @@
       last = clock;
       if (now >= end) play(false);
     }
-    if (!stale) return;
-    stale = false;
+    if (!stage.stale) return;
+    stage.stale = false;
     scrub.value = now;
     at("time").value = `t = ${now.toFixed(2)}`;
     scrub.setAttribute("aria-valuetext", at("time").value);
-    panels.forEach((each, j) => {
-      pose(each, now);
-      const [left, top, width, height] = panel(j), place = [left, stage.clientHeight - top - height, width, height];
-      renderer.setViewport(...place);
-      renderer.setScissor(...place);
-      renderer.render(each.scene, camera);
-    });
+    panels.forEach((each) => pose(each, now));
+    stage.render(panels);
     drawEnergy();
   }
 
@@ -306,7 +160,7 @@
     name.textContent = run.title;
     when.className = "when";
     title.append(name, when);
-    stage.append(title);
+    element.append(title);
     const energy = document.createElement("div"), swatch = document.createElement("span");
     swatch.className = `swatch ${kinds[j]}`;
     energy.append(swatch, `energy ${run.energy[0].toPrecision(5)}, varies by ${run.drift.toExponential(0)}${runs.length > 1 ? ` (${short(run.title)})` : ""}`);
@@ -315,27 +169,25 @@
   at("energy").setAttribute("aria-label", `energy against time: ${at("energies").textContent}`);
   const thinned = runs.filter((run) => run.frames > run.t.length).map((run) => `${short(run.title)}: ${run.t.length} of its ${run.frames} frames are shown, to keep the page small`);
   const held = runs.filter((run) => run.held).map((run) => `${short(run.title)}: its ${run.t.length} frames are too far apart to draw the motion between them, and are shown one by one; take more frames`);
-  at("note").replaceChildren(...[...thinned, ...held, `radius drawn ${R.toPrecision(3)}`].map((text) => {
+  at("note").replaceChildren(...[...thinned, ...held, `radius drawn ${data.radius.toPrecision(3)}`].map((text) => {
     const line = document.createElement("div");
     line.textContent = text;
     return line;
   }));
   at("play").onclick = () => play(!playing);
-  at("home").onclick = home;
+  at("home").onclick = stage.home;
   at("colour").onchange = legend;
   scrub.oninput = () => { play(false); go(Number(scrub.value)); };
   const seek = (event) => go(start + (end - start) * (event.offsetX - edge) / (strip.clientWidth - 2 * edge));
   strip.onpointerdown = (event) => { play(false); strip.setPointerCapture(event.pointerId); seek(event); };
   strip.onpointermove = (event) => { if (event.buttons) seek(event); };
-  orbit.addEventListener("change", () => { stale = true; });
-  orbit.addEventListener("start", () => { moved = true; });
-  new ResizeObserver(resize).observe(stage);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
+  new ResizeObserver(resize).observe(element);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.paint(panels));
   document.addEventListener("keydown", (event) => {
-    const turns = { ArrowRight: () => turn(0.1, 0, 1), ArrowLeft: () => turn(-0.1, 0, 1), ArrowUp: () => turn(0, 0.1, 1), ArrowDown: () => turn(0, -0.1, 1) };
-    const zooms = { "+": () => turn(0, 0, 0.9), "-": () => turn(0, 0, 1 / 0.9) };
+    const turns = { ArrowRight: () => stage.turn(0.1, 0, 1), ArrowLeft: () => stage.turn(-0.1, 0, 1), ArrowUp: () => stage.turn(0, 0.1, 1), ArrowDown: () => stage.turn(0, -0.1, 1) };
+    const zooms = { "+": () => stage.turn(0, 0, 0.9), "-": () => stage.turn(0, 0, 1 / 0.9) };
     const times = { " ": () => play(!playing), ArrowRight: () => step(1), ArrowLeft: () => step(-1), Home: () => go(start), End: () => go(end) };
-    const keys = { ...times, ...zooms, ...(event.shiftKey || stage.matches(":focus-visible") ? turns : {}) };
+    const keys = { ...times, ...zooms, ...(event.shiftKey || element.matches(":focus-visible") ? turns : {}) };
     const takesKeys = ["SELECT", "SUMMARY"].includes(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON");
     if (!keys[event.key] || event.ctrlKey || event.altKey || event.metaKey || takesKeys) return;
     event.preventDefault();
@@ -345,10 +197,10 @@
   const size = 10 ** Math.floor(Math.log10((end - start) / 4)), usual = end - start >= 0.9 && end - start <= 40 || end === start;
   const rate = usual ? 1 : [5, 2, 1].map((m) => m * size).find((m) => (end - start) / m >= 4);
   for (const m of [0.25, 0.5, 1, 2, 4]) at("speed").add(new Option(Number((m * rate).toPrecision(3)), m * rate, m === 1, m === 1));
-  globalThis.discs = { panels, camera, go, play }; // for the console
+  globalThis.discs = { panels, camera: stage.camera, go, play }; // for the console
   resize();
   legend();
-  paint();
+  stage.paint(panels);
   play(end > start && !matchMedia("(prefers-reduced-motion: reduce)").matches);
   requestAnimationFrame(draw);
 })();
