@@ -69,7 +69,7 @@ def work_precision(
     Parameters
     ----------
     scenes : a scene, or several by name.
-    n : numbers of discs, with plain springs at free ends. Chains with true curvature run in NumPy, by every method.
+    n : numbers of discs, with plain springs at free ends.
     methods : problem -> peers to run; None takes those that are installed.
     repeats : number of rounds.
     seconds : the longest processor time for one run; three times that for all runs of a method on a problem.

@@ -29,7 +29,7 @@ from discs.arrays import Float
 from discs.running.estimates import differences, sizes
 
 SIZES = 3, 200  # discs
-TRUE = 0.25  # share of unit-law chains that have true curvature, with the following limits as they run on the plain engine only
+TRUE = 0.25  # share of unit-law chains that have true curvature, within the following limits
 TRUE_SIZE, TRUE_DURATION = 12, 2.0
 REFINED = 24
 HIGH = 5.0  # largest ratio of estimate to error wanted in nine of ten runs

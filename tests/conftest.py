@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items):
         if not isinstance(model, Model) or name not in METHODS or given.get("engine") == "plain":
             continue
         law = "own" if model.law == "steered" else model.law
-        if law != "true" and "kernels_as_python" not in item.fixturenames and name not in ahead(law):
+        if "kernels_as_python" not in item.fixturenames and name not in ahead(law):
             item.add_marker(pytest.mark.long)
 
 
@@ -70,13 +70,13 @@ def models(kinds: list[Model], short: list[Model] | None = None):
 
 
 def models_and_engines(kinds: list[Model], plain: list[Model] | None = None, short: list[Model] | None = None):
-    """Each model with the compiled twin where there is one, and with the plain one, which may be tried on fewer or on more.
+    """Each model with the compiled twin, and with the plain one, which may be tried on fewer or on more.
 
     If `short` is given, the plain one runs with other models in the long suite only.
     """
-    pairs = [(m, "compiled") for m in kinds if m.law != "true"]
+    pairs = [(m, "compiled") for m in kinds]
     every = dict.fromkeys([*kinds, *(plain or [])])
-    pairs += [(m, "plain") for m in every if plain is None or m in plain or m.law == "true"]
+    pairs += [(m, "plain") for m in every if plain is None or m in plain]
     marked = [pair if short is None or pair[1] == "compiled" or pair[0] in short else longer(*pair) for pair in pairs]
     return pytest.mark.parametrize(("model", "engine"), marked, ids=[f"{m.law}-{m.ends}-{engine}" for m, engine in pairs])
 

@@ -1,7 +1,7 @@
 """Peers that take a right-hand side, the reduced equations: SciPy and SUNDIALS.
 
 All get the same compiled function, y. = f(t, y) with y = (x, y, theta, pi, ...) disc by disc, bound to its chain and its loads so
-that a call has little overhead. Chains without a compiled form (true curvature) get the plain one, as our own methods do.
+that a call has little overhead. Chains without a compiled form (a law in NumPy) get the plain one, as our own methods do.
 """
 
 import time as clock

@@ -1,7 +1,7 @@
 """`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it.
 
 Those of gradients and Lyapunov exponents are among them (`discs.analysis.tangent`). With `--tested` those that the short suite
-runs: midpoint and Gauss methods for every chain, all kinds for the field law, without tangents.
+runs: midpoint and Gauss methods for every chain (true curvature: midpoint), all kinds for the field law, without tangents.
 """
 
 import argparse
@@ -36,10 +36,11 @@ def sharing(law: str, tested: bool = False) -> list[list[Integrator]]:
     return [methods for methods in found.values() if any(method.name in some for method in methods)]
 
 
-KINDS = {"slaved": tuple(ROLLING), "own": ("own",)}  # of chains
+KINDS = {"slaved": (*ROLLING, "true"), "own": ("own",)}  # of chains; "true" is the true curvature with the unit law
 TESTED = {  # by the short suite
     "field": tuple(METHODS),
     "unit": ("midpoint", "gauss6"),
+    "true": ("midpoint",),
     "own": ("midpoint", "gauss6"),
 }
 SIZES = {"few": 9, "many": MANY}  # discs; many with slaved headings have kernels of their own, those in lanes
@@ -48,10 +49,13 @@ SIZES = {"few": 9, "many": MANY}  # discs; many with slaved headings have kernel
 def compile_for(law: str, size: str, tested: bool) -> None:
     """Compile every kernel for one kind of chain, or those that are tested: slaved headings with a law, or "own" headings."""
     steered = law == "own"
-    words = "discs with own headings" if steered else f"discs with slaved headings, {law} law"
+    true = law == "true"
+    slaved = "true curvature" if true else f"{law} law"
+    words = "discs with own headings" if steered else f"discs with slaved headings, {slaved}"
+    kind: dict[str, Any] = {"rolling": "unit", "curvature": "true"} if true else {"rolling": law}
     values: dict[str, Any] = dict.fromkeys(ONES + STEERED if steered else ONES, 1.0)
     n = SIZES[size]
-    chain: Chain | SteeredChain = SteeredChain(n=n, **values) if steered else Chain(n=n, **values, rolling=law)
+    chain: Chain | SteeredChain = SteeredChain(n=n, **values) if steered else Chain(n=n, **values, **kind)
     problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s if steered else None), 0.01)  # at rest
     for methods in sharing(law, tested):
         first = methods[0]

@@ -49,7 +49,7 @@ class Linear(Load):
     offset : energy.
     strain : rest strains of springs, times the root of their stiffness; any shape.
     drives : the parts that depend on time.
-    section : see `Load`; the load then has no compiled form.
+    section : see `Load`; rest stretch and shear have no compiled form.
     bends : rest curvature and viscosity of bending of slaved headings, whose force and potential are added; None for none.
     about : places (rows, n) of springs: the potential is summed from there, so stiff springs far from the origin lose no digits.
     degree : of the chain's elements, where there is viscosity: for 2, B v and its transpose are those of `discs.chains.elements`.
@@ -221,7 +221,9 @@ class Linear(Load):
 
     @cached_property
     def parameters(self) -> Any:
-        if self.section is not None or (self.degree == 2 and self.viscosity is not None):
+        if (self.degree == 2 and self.viscosity is not None) or (self.section is not None and self.section.ndim == 2):
+            return None
+        if self.bends is not None and self.bends.viscosity.any() and not self.bends.chain.link_law.quadratic:
             return None
         from discs.kernels import load
         from discs.kernels.bends import NO_BENDS

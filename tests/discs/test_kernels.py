@@ -15,11 +15,10 @@ from discs.integrators.composition import Composition
 from discs.integrators.ivp import Reduced
 from discs.kernels import banded, blocks, compiled, steered_links
 from discs.running import ready
-from tests.conftest import ALL, SLAVED, STEERED, Model, longer, models, uneven
+from tests.conftest import ALL, Model, longer, models, uneven
 
 pytestmark = pytest.mark.slow
 
-COMPILED = SLAVED + STEERED
 SIZES = [2, 3, 4, 5, 6, 7, 8, 9, 12, 31]
 # rounding differs in the order of sums: a few units in the last place, times what an unconverged sweep of a stiff step leaves
 CLOSE = 3e-12
@@ -34,7 +33,7 @@ def settings(name: str):
     return [cls(), cls(once) if once else cls(sweeps=1, tolerance=0)]
 
 
-@models(COMPILED, [m for m in COMPILED if m.ends != "paper" and m != Model("consistent", "field")])
+@models(ALL, [m for m in ALL if m.ends != "paper" and m != Model("consistent", "field")])
 @pytest.mark.parametrize("name", [name for name, cls in METHODS.items() if not cls.adaptive])
 @pytest.mark.filterwarnings("ignore:.*energy is conserved, but")  # one sweep of Gauss methods is not yet a step
 def test_twins_agree(name, model):
@@ -49,12 +48,15 @@ def test_twins_agree(name, model):
             a, b = (simulate(problem, method, dt, times, ("velocity",), False, engine) for engine in ("compiled", "plain"))
             for row in (*problem.system.rows, "omega", "x_rate", "energy"):
                 np.testing.assert_allclose(getattr(a, row), getattr(b, row), atol=CLOSE, err_msg=f"n = {n}, {method}")
+            off = (
+                0.3 if model.law == "true" else 0.1
+            )  # rounding in angles keeps the plain form from converging for some sweeps more
             for count in ("steps", "gradients", "solves", "unconverged"):
-                assert abs(a.stats[count] - b.stats[count]) <= 0.1 * b.stats[count], (n, method, count)
+                assert abs(a.stats[count] - b.stats[count]) <= off * b.stats[count], (n, method, count)
             assert (a.stats["engine"], b.stats["engine"]) == ("compiled", "plain")
 
 
-@models(COMPILED)
+@models(ALL)
 def test_reduced_equations_agree_and_stay_within_their_sparsity(model):
     problem = uneven(9, model)
     plain, compiled = Reduced(problem.system), Reduced(problem.system, problem.system.parameters)
@@ -147,11 +149,6 @@ def test_sines_and_cosines():
     all_of(x, cos, sin)
     np.testing.assert_allclose(cos, [math.cos(v) for v in x], rtol=0, atol=1.2e-16)
     np.testing.assert_allclose(sin, [math.sin(v) for v in x], rtol=0, atol=1.2e-16)
-
-
-def test_true_curvature_has_the_plain_form_only():
-    run = simulate(uneven(7, ALL[-3]), dt=0.05, progress=False)
-    assert run.stats["engine"] == "plain"
 
 
 def test_runs_do_not_touch_the_problem():

@@ -8,7 +8,9 @@ Strains are the turning of the line at disc i per length, (arg d_i - arg d_{i-1}
 since d_0 x d_1 = M x D. The ends have no bending spring: the natural condition is phi' = 0.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
@@ -17,6 +19,9 @@ from discs.arrays import Complex, Float
 from discs.chains import stencils
 from discs.chains.links.law import LinkLaw
 from discs.chains.rolling_discs import Assembly, Strains, folded
+from discs.kernels import protocol as do
+from discs.kernels.compiled import fill, part
+from discs.kernels.slaved_matrix import RING, Matrix
 
 if TYPE_CHECKING:
     from discs.chains.chain import Chain
@@ -42,7 +47,6 @@ class TrueCurvature(LinkLaw):
 
     name = "true"
     quadratic, end_bends, stretches, directed = False, False, True, True
-    parameters = None
 
     @staticmethod
     def density(bending: Float, stretching: Float, z: Complex, z1: Complex) -> Float:
@@ -151,3 +155,133 @@ class TrueCurvature(LinkLaw):
             links[:, 1, side] = sign * c[2, disc]
         stiffness = np.stack([self._stretching, self._torsion], axis=1)
         return self._assembly((bends, self._bending[:, None]), (links, stiffness))
+
+    @cached_property
+    def parameters(self) -> "TrueSprings":
+        n, ring = self._n, self._ring
+        bends, links = slice(None) if ring else slice(1, n - 1), slice(1, n + ring)
+        bend, rest, stretch, torsion = np.zeros(n), np.zeros(n), np.zeros(n + 1), np.zeros(n + 1)
+        bend[bends], rest[bends] = self._bending, self._rest
+        stretch[links], torsion[links] = self._stretching, self._torsion
+        stretch[0], torsion[0] = stretch[n], torsion[n]
+        return TrueSprings(bend, rest, stretch, torsion, self._k)
+
+
+class TrueSprings(NamedTuple):
+    """Parameters of the compiled form, whose links are those of `discs.kernels.slaved`: link j is before disc j.
+
+    bend : (n,), K times the share of the disc, 0 where there is no bending spring. rest : (n,), the rest curvature.
+    stretch, torsion : (n + 1,), A k and beta k of the links, 0 for ghost links.
+    """
+
+    bend: Float
+    rest: Float
+    stretch: Float
+    torsion: Float
+    k: float
+
+
+@part
+def opening(cross: float, dot: float) -> float:
+    """The angle of two vectors over their cross product, arctan(x)/x/dot with x = cross/dot; for small angles by its series."""
+    if abs(cross) > 0.1 * dot:
+        return math.atan2(cross, dot) / cross
+    over = 1 / dot
+    x = (cross * over) ** 2
+    high = 1 / 9 - x * (1 / 11 - x * (1 / 13 - x * (1 / 15 - x / 17)))
+    return over * (1 - x * (1 / 3 - x * (1 / 5 - x * (1 / 7 - x * high))))
+
+
+@part
+def turned(d: Float, i: int) -> float:
+    """The angle between the links before and after disc i."""
+    ax, ay, bx, by = d[0, i], d[1, i], d[0, i + 1], d[1, i + 1]
+    cross, dot = ax * by - ay * bx, ax * bx + ay * by
+    return cross * opening(cross, dot) if dot > 0 else math.atan2(cross, dot)
+
+
+@part
+def link(before: Float, d: Float, j: int) -> tuple[float, float, float, float]:
+    """Of link j with the middle M = d: w and u of the gradients w J M of its angle and u M of its length, mean length, delta."""
+    x, y, ax, ay = d[0, j], d[1, j], before[0, j], before[1, j]
+    dx, dy = 2 * (x - ax), 2 * (y - ay)
+    bx, by = ax + dx, ay + dy
+    lengths, cross = math.sqrt(ax * ax + ay * ay) + math.sqrt(bx * bx + by * by), x * dy - y * dx
+    w = opening(cross, ax * bx + ay * by)
+    return w, 2 / lengths, 0.5 * lengths, w * cross
+
+
+@fill(do.elastic, TrueSprings)
+def _elastic(law: TrueSprings, d: Float) -> float:
+    total = 0.0
+    for i in range(law.bend.size):
+        length = math.sqrt(d[0, i + 1] * d[0, i + 1] + d[1, i + 1] * d[1, i + 1])
+        stretch, twist = length / law.k - 1, d[2, i + 1] / law.k
+        total += law.stretch[i + 1] * stretch * stretch + law.torsion[i + 1] * twist * twist
+        if law.bend[i] != 0:
+            bend = turned(d, i) / law.k - law.rest[i]
+            total += law.bend[i] * bend * bend
+    return 0.5 * total
+
+
+@part
+def moment(law: TrueSprings, before: Float, turn: Float, i: int) -> Any:
+    """The mean moment of disc i over a step in which link j turns by turn[j]; the angle before and after is within (-pi, pi]."""
+    if law.bend[i] == 0:
+        return 0.0
+    start = turned(before, i)
+    end = start + (turn[i + 1] - turn[i])
+    if end > math.pi:
+        end -= 2 * math.pi
+    elif end < -math.pi:
+        end += 2 * math.pi
+    return law.bend[i] * (0.5 * (start + end) / law.k - law.rest[i])
+
+
+@fill(do.tension, TrueSprings)
+def _tension(law: TrueSprings, ends: int, before: Float, d: Float, g: Float) -> None:
+    n, per, ring, (x, y, theta), (gx, gy, turn) = d.shape[1] - 1, 1 / law.k, ends == RING, d, g
+    links = n + 1 if ring else n
+    for j in range(1, links):  # for now w and the pull of the length's gradient, and the turn
+        w, u, length, turn[j] = link(before, d, j)
+        gx[j], gy[j] = per * w, per * u * law.stretch[j] * (per * length - 1)
+    turn[0] = turn[n]
+    first = moment(law, before, turn, 0) if ring else 0.0
+    last = first
+    for j in range(1, links):
+        next_ = first if j == n else moment(law, before, turn, j)
+        bent, pull = gx[j] * (last - next_), gy[j]
+        gx[j], gy[j] = pull * x[j] - bent * y[j], pull * y[j] + bent * x[j]
+        last = next_
+    for row in range(2):
+        if not ring:
+            g[row, n] = 0.0
+        g[row, 0] = g[row, n]
+    for j in range(n + 1):
+        turn[j] = per * per * law.torsion[j] * theta[j]
+
+
+@fill(do.assemble, TrueSprings)
+def _assemble(law: TrueSprings, ends: int, before: Float, d: Float, c: Float, one: float, g: float, matrix: Matrix) -> None:
+    n, per, ring, (x, y, _), (cx, cy, ct) = d.shape[1] - 1, 1 / law.k, ends == RING, d, c
+    a, u, w = matrix.a, matrix.u, matrix.w
+    matrix.corner[0] = matrix.corner[1] = 0
+    for i in range(n):
+        a[i], u[i], w[i] = one, 0.0, 0.0
+    last, last_first, last_second = n - 1, 0.0, 0.0  # the turn of the link before by each of its two discs
+    for j in range(0 if ring else 1, n + 1 if ring else n):
+        i, m = j - 1 if j > 0 else n - 1, j if j < n else 0  # its discs
+        turn, pull, _, _ = link(before, d, j)
+        turn, pull = per * turn, per * pull
+        first, second = turn * (x[j] * cy[i] - y[j] * cx[i]), turn * (x[j] * cy[m] - y[j] * cx[m])
+        if j > 0:
+            bend, middle = g * law.bend[i], last_second + first
+            stretch, twist = g * law.stretch[j], g * per * per * law.torsion[j]
+            along, beyond = pull * (x[j] * cx[i] + y[j] * cy[i]), pull * (x[j] * cx[m] + y[j] * cy[m])
+            a[last] += bend * last_first * last_first
+            u[last] -= bend * last_first * middle
+            w[last] += bend * last_first * second
+            a[i] += bend * middle * middle + stretch * along * along + twist * ct[i] * ct[i]
+            u[i] -= bend * middle * second + stretch * along * beyond + twist * ct[i] * ct[m]
+            a[m] += bend * second * second + stretch * beyond * beyond + twist * ct[m] * ct[m]
+        last, last_first, last_second = i, first, second
