@@ -11,7 +11,7 @@ import pytest
 from continuum import solve, untwisting_rod
 from discs import Chain, Problem, State, SteeredChain
 from discs.integrators import METHODS
-from discs.kernels import dop853, driver, tangent, trace
+from discs.kernels import adjoint, dop853, driver, tangent, trace
 from discs.kernels.__main__ import sharing
 from discs.kernels.background import ENGINE, USUAL
 
@@ -130,7 +130,7 @@ def kernels_as_python(monkeypatch):
     for name in ("march", "look", "observe", "reduced"):
         monkeypatch.setattr(driver, name, getattr(driver, name).__wrapped__)
     monkeypatch.setattr(dop853, "run", dop853.run.__wrapped__)
-    for module, names in ((tangent, ("back", "forward")), (trace, ("trace",))):
+    for module, names in ((adjoint, ("back",)), (tangent, ("tangent",)), (trace, ("trace",))):
         for name in names:
             monkeypatch.setattr(module, name, getattr(module, name).__wrapped__)
 

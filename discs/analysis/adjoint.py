@@ -1,7 +1,7 @@
 r"""Gradients of a cost by the discrete adjoint: exact for the computed motion, in one pass back.
 
 A collocation step K_i = f(Y_i), Y_i = y_n + h sum_j a_ij K_j, y_{n+1} = y_n + h sum_i b_i K_i takes the derivative lambda_{n+1} of
-the cost back to that before the step by its transpose (`discs.analysis.tangent`), which has a u_i for each stage:
+the cost back to that before the step by its transpose (`discs.analysis.sparse_tangent`), which has a u_i for each stage:
 
     lambda_n = lambda_{n+1} + sum_i u_i,   dJ/dp += sum_i M_i . df/dp(Y_i),   M_i = h (b_i lambda_{n+1} + sum_j a_ji u_j).
 
@@ -17,11 +17,11 @@ import numpy as np
 
 from discs import checks
 from discs.analysis.costs import RATES, cost_by_frame
-from discs.analysis.forces import LoadParameter
-from discs.analysis.parameters import INERTIAS, STIFFNESSES, Inertias, Pull, Springs, basis_by
+from discs.analysis.parameters import INERTIAS, STIFFNESSES, Parameters
+from discs.analysis.sparse_tangent import tangent
 from discs.analysis.stages import At, equations
 from discs.analysis.steps import Steps
-from discs.analysis.tangent import back, ready
+from discs.analysis.swept import ready, sweeps
 from discs.arrays import Float
 from discs.integrators import Integrator, Midpoint, find
 from discs.integrators.collocated import Collocated
@@ -34,7 +34,7 @@ from discs.simulation import simulate
 from discs.skew import Phase
 from discs.solution import Solution
 
-FEWEST = 32  # steps between two states that are kept
+FEWEST = 256  # steps between two states that are kept
 INITIAL = ("x", "y", "theta", "phi", "omega", "phi_rate")
 
 
@@ -130,11 +130,7 @@ class _Adjoint:
     def __init__(self, problem: Problem, integrator: Any, h: float, names: tuple[str, ...], compiled: bool) -> None:
         self.problem, self.system, self.integrator, self.h, self.names = problem, problem.system, integrator, h, names
         self.steps, self.equations = Steps(problem, integrator, compiled), equations(problem)
-        self.inertias, self.of_discs = Inertias(self.equations), [name for name in names if name in INERTIAS]
-        self.springs = {name: Springs(problem, name) for name in names if name in STIFFNESSES}
-        self.of_loads = [LoadParameter(problem, name) for name in names if name.startswith("loads")]
-        self.found = {name: np.zeros(problem.chain.n) for name in self.of_discs}
-        self.stretched: Any = 0.0
+        self.sweeps, self.parameters = sweeps(self.steps), Parameters(self.equations, names)
 
     def gradient(
         self,
@@ -183,26 +179,33 @@ class _Adjoint:
 
     def _back(self, z: Phase, first: int, end: int, h: float, value: Float, seeds: dict[int, Float]) -> Float:
         """The value before the steps `first` to `end` of size h from a state; what parameters do in them is added up."""
-        rule, t = self.steps.rule, first * self.h
-        taken = self.steps.take(z, t, h, end - first)
-        stages = end - first, rule.b.size
-        times = t + h * np.add.outer(np.arange(stages[0]), rule.nodes).ravel()
-        at = self.equations.at(taken.q.reshape(-1, *taken.q.shape[2:]), taken.pi.reshape(-1, *taken.pi.shape[2:]), times)
-        value, m = back(rule, h, self.equations, at, value, self.steps.compiled, seeds)
-        if self.of_discs or self.springs or self.of_loads:
-            pull = Pull.of(at, m)
-            for name, part in self.inertias(at, pull, self.of_discs).items():
-                self.found[name] += part
-            if self.springs:
-                self.stretched = self.stretched + self.equations.stretched(at, pull.w)
-            for load in self.of_loads:
-                load.add(at, pull)
+        t, left, value = first * self.h, end - first, value.copy()
+        taken = self.steps.take(z, t, h, left)
+        while left:
+            if self.sweeps is not None:
+                done, sums, passed = self.sweeps.back(taken, t, h, left, value, seeds, self.parameters.rates)
+                self.parameters.add(sums, passed)
+                left -= done
+            elif left - 1 in seeds:
+                value += seeds[left - 1]
+            if left:  # a step that sweeps do not solve
+                left -= 1
+                value = self._back_by_matrix(taken.q[left], taken.pi[left], t + h * left, h, value)
         return value
+
+    def _back_by_matrix(self, q: Float, pi: Float, t: float, h: float, value: Float) -> Float:
+        """The value before one step with these stages."""
+        at = self.equations.at(q, pi, t + h * self.steps.rule.nodes)
+        step = tangent(self.steps.rule, h, at.each or self.equations.each(q, pi, at.t))
+        u = step.stages_back(value)
+        self.parameters.add_stages(at, step.rates_back(value, u))
+        found: Float = value + u.sum(axis=0)
+        return found
 
     def _seeds(self, at: At, slopes: list[dict[str, Float]]) -> Float:
         """The derivatives of the cost by the states of frames, (F, size): omega = C_theta pi."""
         q, pi = np.zeros_like(at.q), np.zeros_like(at.pi)
-        by_disc = {name: basis_by(self.problem, at.c, at.arm, name) for name in self.of_discs}
+        by_disc = {name: self.parameters.basis_by(at, name) for name in self.parameters.by_disc}
         for name in slopes[0]:
             given = np.array([slope[name] for slope in slopes])
             if name not in RATES:
@@ -213,7 +216,7 @@ class _Adjoint:
             for i, (into, heading) in enumerate(self.equations.headings):
                 q[:, into] += (heading.T @ (given * at.turned[:, i, row]).T).T
             for inertia, change in by_disc.items():
-                self.found[inertia] += (given * at.pi[:, row - 2] * change[:, row]).sum(axis=0)
+                self.parameters.by_disc[inertia] += (given * at.pi[:, row - 2] * change[:, row]).sum(axis=0)
         return np.concatenate([q.reshape(len(q), -1), pi.reshape(len(q), -1)], axis=1)
 
     def _of_start(self, value: Float) -> dict[str, Float]:
@@ -231,9 +234,7 @@ class _Adjoint:
             shrink = -rates[name] * given[name] / c[row]
             for i, (into, heading) in enumerate(self.equations.headings):
                 q[into] += heading.T @ (shrink * turned[i, row])
-            for inertia in self.of_discs:
-                self.found[inertia] += shrink * basis_by(problem, at.c, at.arm, inertia)[0, row]
-        found = dict(zip(self.system.rows, q, strict=True)) | rates | self.found
-        found |= {name: springs.by_stiffness(self.stretched) for name, springs in self.springs.items()}
-        found |= {load.name: load.total() for load in self.of_loads}
+            for inertia in self.parameters.by_disc:
+                self.parameters.by_disc[inertia] += shrink * self.parameters.basis_by(at, inertia)[0, row]
+        found = dict(zip(self.system.rows, q, strict=True)) | rates | self.parameters.found()
         return {name: found[name] for name in self.names}

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from discs import checks
-from discs.analysis.parameters import Pull
-from discs.analysis.stages import At
+from discs.analysis.stages import Passed
 from discs.arrays import Float
 from discs.differences import slope
 from discs.loads import signals
@@ -64,9 +63,9 @@ class LoadParameter:
         self._driven = np.zeros((len(bound.drives), *bound.constant.shape))
         self._by_signal = np.zeros(self.value.shape)
 
-    def add(self, at: At, pull: Pull) -> None:
+    def add(self, at: Passed) -> None:
         """Add what these states contribute."""
-        w = pull.w
+        w = at.w
         if self._signal is not None:
             power = np.array([(drive.pattern * w).sum(axis=(1, 2)) for drive in self._bound.drives]).sum(axis=0)
             for place in np.ndindex(self.value.shape):

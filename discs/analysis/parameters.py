@@ -9,33 +9,19 @@ root² = w (alpha + rho |e|²) and e = R times a vector; with own headings there
 them too: pi = root omega. And weight, a part of F, is proportional to rho. `discs.analysis.forces` has the parameters of loads.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from discs.analysis.stages import At, Equations
+from discs.analysis.forces import LoadParameter
+from discs.analysis.stages import At, Equations, Passed
 from discs.arrays import Float
 from discs.problem import Problem
 
 INERTIAS = ("density", "spin_inertia", "radius", "heading_inertia")
 STIFFNESSES = ("torsion_stiffness", "bending_stiffness", "stretch_stiffness", "shear_stiffness")
-
-
-class Pull(NamedTuple):
-    """Multipliers of the rates at M states: mu and w = C nu, (M, rows, n), and nu, (M, columns, n)."""
-
-    mu: Float
-    nu: Float
-    w: Float
-
-    @classmethod
-    def of(cls, at: At, m: Float) -> "Pull":
-        """Of the multipliers (M, size)."""
-        (count, rows, n), size = at.q.shape, at.q[0].size
-        nu = m[:, size:].reshape(count, -1, n)
-        return cls(m[:, :size].reshape(at.q.shape), nu, at.c * nu[:, np.arange(rows) // 3])
 
 
 def basis_by(problem: Problem, c: Float, arm: Float, name: str) -> Float:
@@ -56,33 +42,67 @@ def basis_by(problem: Problem, c: Float, arm: Float, name: str) -> Float:
     return found
 
 
-class Inertias:
-    """The sum over states of M . df by the inertias and radii of the discs."""
+class Parameters:
+    """The derivatives by the parameters of a chain and its loads, which steps back add up.
 
-    def __init__(self, equations: Equations) -> None:
-        self._equations, self._problem = equations, equations.problem
+    Attributes
+    ----------
+    by_disc : {name: (n,)}, by inertias and radii. rates : whether `add` needs what is `Passed`.
+    """
 
-    def __call__(self, at: At, pull: Pull, names: list[str]) -> dict[str, Float]:
-        """{name: (n,)}."""
-        if not names:
-            return {}
-        problem, column = self._problem, np.arange(at.q.shape[1]) // 3
-        mu = pull.mu if problem.system.load is None else pull.mu + self._equations.dragged(at, pull.w)
-        force = mu * at.pi[:, column] - pull.nu[:, column] * at.unbalanced
-        found = {name: (basis_by(problem, at.c, at.arm, name) * force).sum(axis=(0, 1)) for name in names}
-        if "density" in found and problem.system.load is not None:
-            found["density"] = found["density"] + (self._weight * pull.w.sum(axis=0)).sum(axis=0)
-        return found
+    def __init__(self, equations: Equations, names: Iterable[str]) -> None:
+        self._equations, problem = equations, equations.problem
+        self.by_disc = {name: np.zeros(problem.chain.n) for name in names if name in INERTIAS}
+        self._springs = {name: Springs(problem, name) for name in names if name in STIFFNESSES}
+        self._loads = [LoadParameter(problem, name) for name in names if name.startswith("loads")]
+        self._stretched: Any = 0.0
+        self._weight = weight(problem) if "density" in self.by_disc else None
+        self.rates = bool(self._springs or self._loads) or self._weight is not None
 
-    @cached_property
-    def _weight(self) -> Float:
-        """What a load gains with the density, (rows, n): weight is proportional to it."""
-        problem, chain, q = self._problem, self._problem.chain, self._problem.start().hi
-        heavier = replace(problem, chain=replace(chain, density=np.asarray(chain.density) + 1.0)).system.load
-        lighter, still = problem.system.load, np.zeros_like(q)
-        assert heavier is not None
-        assert lighter is not None
-        return heavier.applied(0.0, q, still) - lighter.applied(0.0, q, still)
+    def add(self, sums: Float, passed: Passed | None) -> None:
+        """Add what some steps contribute: `sums` as in `linearised.weigh`, (4, n)."""
+        for name, found in self.by_disc.items():
+            found += sums[INERTIAS.index(name)] * (1.0 if name == "radius" else self._equations.chain.w)
+        if passed is None:
+            return
+        if self._weight is not None:
+            self.by_disc["density"] += (self._weight * passed.w.sum(axis=0)).sum(axis=0)
+        if self._springs:
+            self._stretched = self._stretched + self._equations.stretched(passed.q, passed.w)
+        for load in self._loads:
+            load.add(passed)
+
+    def add_stages(self, at: At, m: Float) -> None:
+        """Add what states with multipliers m (M, size) contribute: the plain twin of `linearised.weigh`."""
+        (count, rows, n), size, sums = at.q.shape, at.q[0].size, np.zeros((len(INERTIAS), at.q.shape[2]))
+        nu, column = m[:, size:].reshape(count, -1, n), np.arange(rows) // 3
+        w = at.c * nu[:, column]
+        mu = m[:, :size].reshape(at.q.shape) + self._equations.dragged(at, w)
+        force = mu * at.pi[:, column] - nu[:, column] * at.unbalanced
+        for name in self.by_disc:
+            share = 1.0 if name == "radius" else self._equations.chain.w
+            sums[INERTIAS.index(name)] = (self.basis_by(at, name) * force).sum(axis=(0, 1)) / share
+        self.add(sums, Passed(at.t, at.q, at.velocity, w))
+
+    def basis_by(self, at: At, name: str) -> Float:
+        """dC by a parameter of `by_disc`, (M, rows, n)."""
+        return basis_by(self._equations.problem, at.c, at.arm, name)
+
+    def found(self) -> dict[str, Float]:
+        """All derivatives by their names, in the shapes of the parameters."""
+        springs = {name: springs.by_stiffness(self._stretched) for name, springs in self._springs.items()}
+        return self.by_disc | springs | {load.name: load.total() for load in self._loads}
+
+
+def weight(problem: Problem) -> Float | None:
+    """What a load gains with the density, (rows, n): weight is proportional to it. None without loads."""
+    lighter, chain, q = problem.system.load, problem.chain, problem.start().hi
+    heavier = replace(problem, chain=replace(chain, density=np.asarray(chain.density) + 1.0)).system.load
+    if lighter is None or heavier is None:
+        return None
+    still = np.zeros_like(q)
+    gained: Float = heavier.applied(0.0, q, still) - lighter.applied(0.0, q, still)
+    return gained
 
 
 class Springs:

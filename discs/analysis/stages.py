@@ -1,7 +1,7 @@
 """The linearised equations at many states at once, the stages of steps and frames; `discs.analysis.linear` has them one by one.
 
 `Equations` are those of any problem. `ConstantEquations` are computed by array operations for all states together, where the second
-derivatives are constant: slaved headings, linear curvature, linear loads. They have a compiled form, `discs.kernels.tangent`.
+derivatives are constant: slaved headings, linear curvature, linear loads. They have a compiled form, `discs.kernels.linearised`.
 """
 
 from dataclasses import replace
@@ -12,9 +12,10 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
 from discs.analysis.linear import Linearised
-from discs.arrays import Float, Int, Matrix
+from discs.arrays import Float, Matrix
 from discs.chains import stencils
 from discs.chains.chain import Chain
+from discs.loads import signals
 from discs.loads.linear import Linear
 from discs.problem import Problem
 from discs.skew import Phase
@@ -38,6 +39,15 @@ class At(NamedTuple):
     turned: Float
     pull: Float
     each: tuple[Linearised, ...] = ()
+
+
+class Passed(NamedTuple):
+    """What the parameters of springs and loads need of M states: t (M,); q, velocity and w = C nu, (M, rows, n)."""
+
+    t: Float
+    q: Float
+    velocity: Float
+    w: Float
 
 
 class Equations:
@@ -75,10 +85,10 @@ class Equations:
         drags = (self.system.load.derivatives(*each)[1] for each in zip(at.t.tolist(), at.q, at.velocity, strict=True))
         return np.array([(drag.T @ part.ravel()).reshape(part.shape) for drag, part in zip(drags, w, strict=True)])
 
-    def stretched(self, at: At, w: Float) -> Float:
-        """The sum over the states of s (B w), (springs,), for strains s and w (M, rows, n)."""
-        parts = zip(at.each, w, strict=True)
-        found: Float = sum(lin.strains.strain * (lin.strains.matrix @ part.ravel()) for lin, part in parts)
+    def stretched(self, q: Float, w: Float) -> Float:
+        """The sum over states of s (B w), (springs,), for strains s and w at positions q, both (M, rows, n)."""
+        strains = (self.system.strains(self.system.shape(place)) for place in q)
+        found: Float = sum(each.strain * (each.matrix @ part.ravel()) for each, part in zip(strains, w, strict=True))
         return found
 
 
@@ -100,7 +110,7 @@ class ConstantEquations(Equations):
         c = np.stack([e[0] * c2, e[1] * c2, c2], axis=1)
         velocity, g = c * pi, self._gradient(links)
         if self.system.load is not None:
-            g -= np.array([self.system.load.applied(*each) for each in zip(t.tolist(), q, velocity, strict=True)])
+            g += _times(self.drag, velocity) + _times(self.held, q) - self.forces(t)
         turned, pull = np.empty((len(q), 2, 3, chain.n)), np.empty((len(q), 2, 1, chain.n))
         for row in (0, 1):
             along = np.zeros_like(z)
@@ -128,10 +138,10 @@ class ConstantEquations(Equations):
         return stencils.pull(tension, ends)
 
     def dragged(self, at: At, w: Float) -> Float:
-        return -(self.drag.T @ w.reshape(len(w), -1).T).T.reshape(w.shape)  # type: ignore[no-any-return]
+        return -_times(self.drag.T, w)
 
-    def stretched(self, at: At, w: Float) -> Float:
-        links = self._links(at.q)
+    def stretched(self, q: Float, w: Float) -> Float:
+        links = self._links(q)
         bends = stencils.bends(links[:, :2], self.chain.ends)
         strain = np.concatenate([bends[:, 0], bends[:, 1], links[:, 2]], axis=1)
         change = self._strains.matrix @ w.reshape(len(w), -1).T
@@ -142,46 +152,35 @@ class ConstantEquations(Equations):
         return self.system.strains(self.system.shape(self.problem.start().hi))
 
     @cached_property
-    def stiff(self) -> Matrix:
-        """S, sparse (3 n, 3 n)."""
-        bending, torsion = self._springs.hessians()
-        whole = scipy.sparse.block_diag([bending, bending, torsion], format="csr")
-        return whole if self.system.load is None else (whole - self._of_load[0]).tocsr()
-
-    @cached_property
     def drag(self) -> Matrix:
         """D, sparse (3 n, 3 n)."""
-        n = self.chain.n
-        found = scipy.sparse.csr_array((3 * n, 3 * n)) if self.system.load is None else (-self._of_load[1]).tocsr()
-        found.eliminate_zeros()
-        return found
+        return self._of_load[1]
+
+    @cached_property
+    def held(self) -> Matrix:
+        """-f_q, sparse (3 n, 3 n)."""
+        return self._of_load[0]
 
     @cached_property
     def _of_load(self) -> tuple[Matrix, Matrix]:
-        q = self.problem.start().hi
-        assert self.system.load is not None
-        return self.system.load.derivatives(0.0, q, np.zeros_like(q))
+        q, load = self.problem.start().hi, self.system.load
+        if load is None:
+            return scipy.sparse.csr_array((q.size, q.size)), scipy.sparse.csr_array((q.size, q.size))
+        of_q, of_v = ((-part).tocsr() for part in load.derivatives(0.0, q, np.zeros_like(q)))
+        for part in (of_q, of_v):
+            part.eliminate_zeros()
+        return of_q, of_v
 
-    @cached_property
-    def order(self) -> Any:
-        """The order of the momenta, `discs.kernels.tangent.Order`."""
-        from discs.kernels.tangent import Order  # numba is slow to import
-
-        n, order = self.chain.n, self.system.order
-        place = np.arange(n) if order is None else np.argsort(order)
-        stiff, drag = _bands(self.stiff, place), _bands(self.drag, place)
-        return Order(place, int(max(stiff.apart.max(initial=0), drag.apart.max(initial=0))), stiff, drag)
-
-    @cached_property
-    def _parts(self) -> tuple[Any, ...]:
-        _, heading = self.headings[0]
-        return _sparse(heading), np.array([row for row, _ in self.headings]), _sparse(self.stiff), _sparse(self.drag)
-
-    def compiled(self, at: At) -> Any:
-        """`discs.kernels.tangent.Stages`."""
-        from discs.kernels.tangent import Stages  # numba is slow to import
-
-        return Stages(at.c, at.c.reshape(len(at.c), -1), at.turned, at.pull, *self._parts)
+    def forces(self, t: Float) -> Float:
+        """f at q = v = 0 and the times t (M,), (M, 3, n); (1, 3, n) if it is constant, (0, 3, n) for none."""
+        load, still = self.system.load, np.zeros_like(self.problem.start().hi)
+        if load is None:
+            return still[None][:0]
+        assert isinstance(load, Linear)
+        constant = replace(load, drives=()).force(0.0, still, still)[None]
+        driven = [np.multiply.outer(signals.values(drive.signal, t, drive.name), drive.pattern) for drive in load.drives]
+        found: Float = constant + sum(driven) if driven else constant
+        return found
 
 
 def equations(problem: Problem) -> Equations:
@@ -195,18 +194,7 @@ def equations(problem: Problem) -> Equations:
     return ConstantEquations(problem) if constant else Equations(problem)
 
 
-def _sparse(matrix: Matrix) -> Any:
-    from discs.kernels.tangent import Sparse  # numba is slow to import
-
-    return Sparse(matrix.data[None].astype(float), matrix.indices.astype(np.intp), matrix.indptr.astype(np.intp))
-
-
-def _bands(matrix: Matrix, place: Int) -> Any:
-    """Where the lower half of C^T (matrix) C goes in bands, for a single column of momenta."""
-    from discs.kernels.tangent import Bands  # numba is slow to import
-
-    n = place.size
-    one, two = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr)), matrix.indices.astype(np.intp)
-    low, high = place[one % n], place[two % n]
-    kept = np.flatnonzero(low >= high)
-    return Bands(kept, one[kept], two[kept], low[kept], (low - high)[kept])
+def _times(matrix: Matrix, q: Float) -> Float:
+    """A sparse matrix times each of q (M, rows, n)."""
+    found: Float = (matrix @ q.reshape(len(q), -1).T).T.reshape(q.shape)
+    return found

@@ -32,7 +32,7 @@ class Steps:
     Parameters
     ----------
     problem : the chain and its loads. integrator : `Midpoint` or `Collocated`.
-    compiled : whether they are compiled; see `discs.analysis.tangent.ready`.
+    compiled : whether they are compiled; see `discs.analysis.swept.ready`.
 
     Attributes
     ----------
@@ -50,10 +50,7 @@ class Steps:
             return self._plain(z, t, h, count)
         from discs.kernels.trace import trace  # numba is slow to import
 
-        chain, s, (rows, n) = self.system.parameters, self.rule.b.size, z.hi.shape
-        if self.system.load is not None and not self.system.load.conservative:
-            times = np.add.outer(t + h * np.arange(count + 1.0), h * np.array([0.0, *self.integrator.parameters.nodes]))
-            chain = chain._replace(load=self.system.load.timed(times.ravel(), abs(h)))
+        chain, s, (rows, n) = self.timed(t, h, count), self.rule.b.size, z.hi.shape
         state = Phase(*[np.array(part, ndmin=2) for part in z])
         q, pi = np.empty((count, s, rows, n)), np.empty((count, s, len(state.pi), n))
         unconverged = trace(self.integrator.parameters, self.integrator.twin_of(self.system, chain), state, t, h, q, pi)
@@ -61,6 +58,19 @@ class Steps:
             signal.raise_signal(signal.SIGINT)
             raise KeyboardInterrupt
         return Taken(Phase(state.hi, state.lo, state.pi.reshape(z.pi.shape)), q, pi, unconverged)
+
+    def times(self, t: float, h: float, count: int) -> Float:
+        """The times of the stages of some steps of size h from the time t, one step after the other."""
+        times: Float = (t + h * np.add.outer(np.arange(float(count)), self.rule.nodes)).ravel()
+        return times
+
+    def timed(self, t: float, h: float, count: int) -> Any:
+        """The parameters of the chain for compiled steps, with the values of signals in these steps."""
+        chain, load = self.system.parameters, self.system.load
+        if load is None or load.conservative:
+            return chain
+        times = np.add.outer(t + h * np.arange(count + 1.0), h * np.array([0.0, *self.integrator.parameters.nodes]))
+        return chain._replace(load=load.timed(times.ravel(), abs(h)))
 
     def _plain(self, z: Phase, t: float, h: float, count: int) -> Taken:
         places, momenta, work, stuck = [], [], Work(), 0

@@ -1,6 +1,6 @@
 """`python -m discs.kernels`: compile all kernels ahead, once per machine, so that no run waits for it.
 
-Those of gradients and Lyapunov exponents are among them (`discs.analysis.tangent`). With `--tested` those that the short suite
+Those of gradients and Lyapunov exponents are among them (`discs.analysis.swept`). With `--tested` those that the short suite
 runs: midpoint and Gauss methods for every chain (true curvature: midpoint), all kinds for the field law, without tangents.
 """
 
@@ -9,7 +9,7 @@ import subprocess
 import sys
 from typing import Any
 
-from discs.analysis.tangent import prepare
+from discs.analysis.swept import prepare
 from discs.chains.chain import Chain, SteeredChain
 from discs.chains.rolling import ROLLING
 from discs.integrators import METHODS, FixedStep, Integrator

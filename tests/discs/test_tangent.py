@@ -8,12 +8,14 @@ import pytest
 from discs import Chain, Problem, SimulationError, State, simulate
 from discs.__main__ import main
 from discs.analysis import lyapunov, modes
-from discs.analysis.stages import At, ConstantEquations, equations
-from discs.analysis.tangent import METHODS, Flow, Swept, back, tangent
+from discs.analysis.sparse_tangent import tangent
+from discs.analysis.steps import Steps, Taken
+from discs.analysis.swept import Swept, sweeps
+from discs.analysis.tangent import METHODS, Flow
 from discs.chains.twist import untwisting_chain
 from discs.differences import slope
+from discs.integrators import find
 from discs.integrators.tableaux import tableau
-from discs.kernels import tangent as kernels
 from discs.loads import Damping, Motor, Rest, Slope, Torque, signals
 from tests.conftest import Model, models, uneven
 
@@ -58,33 +60,49 @@ def test_sweeps_solve_the_systems_of_sparse_matrices(model, stages, kernels_as_p
     problem, rng, rule, h = uneven(9, model), np.random.default_rng(3), tableau(stages), 0.05
     if stages > 1:
         problem = replace(problem, loads=LOADS)
-    found, start = equations(problem), problem.start()
-    assert isinstance(found, ConstantEquations)
-    q = start.hi + 1e-2 * rng.normal(size=(2 * stages, 3, 9))
-    at = found.at(q, rng.normal(size=(2 * stages, 1, 9)), 0.3 + 0.1 * np.arange(2 * stages))
-    first, second = (tangent(rule, h, found.each(q[i], at.pi[i], at.t[i])) for i in (slice(0, stages), slice(stages, None)))
-    w, v, kick = rng.normal(size=(3, 36))
-    value, m = back(rule, h, found, at, w, True, {0: kick})
+    start, size = problem.start(), 36
+    q = start.hi + 1e-2 * rng.normal(size=(2, stages, 3, 9))
+    taken = Taken(start, q, rng.normal(size=(2, stages, 1, 9)), 0)
+    swept = swept_of(problem, rule)
+    first, second = (by_matrices(swept, taken, k, 0.3, h) for k in (0, 1))
+    w, v, kick = rng.normal(size=(3, size))
+    value = w.copy()
+    done, _, passed = swept.back(taken, 0.3, h, 2, value, {0: kick}, True)
     middle = second.back(w) + kick
+    assert done == 2
     np.testing.assert_allclose(value, first.back(middle), atol=1e-11)
-    np.testing.assert_allclose(m[:stages], first.rates_back(middle, first.stages_back(middle)), atol=1e-11)
-    swept = Swept(rule, h, found, At(*(part[:stages] for part in at[:-1])))
+    nu = first.rates_back(middle, first.stages_back(middle))[:, 27:]
+    at = swept.equations.at(q[0], taken.pi[0], passed.t[:stages])
+    np.testing.assert_allclose(passed.w[:stages], at.c * nu[:, None], atol=1e-11)
+    np.testing.assert_allclose(passed.velocity[:stages], at.velocity, atol=1e-13)
+    one = Swept(swept, taken._replace(q=q[:1], pi=taken.pi[:1]), 0.3, h)
     both = np.stack([v, w], axis=1)
-    np.testing.assert_allclose(swept.forward(both), first.forward(both), atol=1e-11)
-    np.testing.assert_allclose(swept.back(both), first.back(both), atol=1e-11)
+    np.testing.assert_allclose(one.forward(both), first.forward(both), atol=1e-11)
+    np.testing.assert_allclose(one.back(both), first.back(both), atol=1e-11)
 
 
 def test_sweeps_that_do_not_converge_leave_it_to_sparse_matrices(kernels_as_python):
     """A rough state: the directions of rolling change from disc to disc faster than a sweep can follow."""
     problem, rng, rule = uneven(9, Model("springs", "field")), np.random.default_rng(3), tableau(1)
-    found = equations(problem)
-    at = found.at(problem.start().hi + 0.3 * rng.normal(size=(1, 3, 9)), 20 * rng.normal(size=(1, 1, 9)), np.zeros(1))
-    sparse = tangent(rule, 1.0, found.each(at.q, at.pi, at.t))
-    right = np.ones((1, 36))
-    assert kernels.forward(rule, found.compiled(at), found.order, 1.0, 1e-13, right, right.copy()) == -1
-    w = rng.normal(size=36)
-    np.testing.assert_array_equal(Swept(rule, 1.0, found, at).forward(w), sparse.forward(w))
-    np.testing.assert_allclose(back(rule, 1.0, found, at, w, True)[0], sparse.back(w), rtol=1e-12)
+    q, swept = problem.start().hi + 0.3 * rng.normal(size=(1, 1, 3, 9)), swept_of(problem, rule)
+    taken = Taken(problem.start(), q, 20 * rng.normal(size=(1, 1, 1, 9)), 0)
+    sparse, w = by_matrices(swept, taken, 0, 0.0, 1.0), rng.normal(size=36)
+    assert not swept.forward(taken, 0.0, 1.0, w[None].copy())
+    assert swept.back(taken, 0.0, 1.0, 1, w.copy(), {}, False)[0] == 0
+    one = Swept(swept, taken, 0.0, 1.0)
+    np.testing.assert_array_equal(one.forward(w), sparse.forward(w))
+    np.testing.assert_array_equal(one.back(w), sparse.back(w))
+
+
+def swept_of(problem, rule):
+    """Sweeps through steps of the Gauss method with this tableau."""
+    return sweeps(Steps(problem, find("midpoint" if rule.b.size == 1 else f"gauss{2 * rule.b.size}"), True))
+
+
+def by_matrices(swept, taken, k, t, h):
+    """The tangent of step k of those that were taken from the time t."""
+    rule = swept.steps.rule
+    return tangent(rule, h, swept.equations.each(taken.q[k], taken.pi[k], t + h * (k + rule.nodes)))
 
 
 @pytest.mark.parametrize("method", METHODS)
