@@ -18,6 +18,7 @@ GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 DRAWN = ROOT / "out" / "gallery"  # where `make docs` runs the scripts
 KATEX = ROOT / "docs" / "katex"  # draws the formulas in the browser
 PACKAGES = ("discs", "continuum", "compare")
+WIDGET = "application/vnd.jupyter.widget-view+json"
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
@@ -60,7 +61,8 @@ def lesson(path: Path) -> tuple[str, dict[str, bytes]]:
         notebook = found
     for cell in notebook.cells:
         if cell.cell_type == "code":
-            cell.outputs = [out for out in cell.outputs if out.get("name") != "stderr"]  # progress bars
+            # neither progress bars nor sliders, which need a kernel
+            cell.outputs = [out for out in cell.outputs if out.get("name") != "stderr" and WIDGET not in out.get("data", {})]
         else:
             cell.source = re.sub(r"\]\(([\w-]+)\.ipynb\)", r"](\1.md)", cell.source)
             cell.source = re.sub(r"\s*(\$\$.+?\$\$)\s*", r"\n\n\1\n\n", cell.source, flags=re.DOTALL)  # a paragraph of its own

@@ -18,6 +18,7 @@ def test_each_method_has_a_line_of_its_own():
     assert set(METHOD) >= set(OURS)
 
 
+@pytest.mark.long  # peers are slow to import
 @pytest.mark.parametrize("law", ["field", "unit"])
 def test_no_method_that_is_compared_is_without_one(law):
     problem = lump(untwisting_rod(law), n=8)
