@@ -32,14 +32,41 @@ def test_has_the_form_of_a_lesson(path):
     code = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
     assert text.startswith(f"# {int(path.name[:2])}. ")
     assert re.match(r"# [^\n]+\n\n\*\*[^\n]+\?\*\*\n", text)  # one question
-    order = ["$$", "**What it means.**", "## Exercises", "## Answers"]
+    assert re.search(r"\n\*About \d+ minutes.* You need .*\. To change: .*\.\*\n", notebook.cells[0].source)
+    order = ["$$", "**What was learnt.**", "## Exercises", "## Answers"]
     assert sorted(order, key=text.index) == order
-    for number in re.findall(r"^(\d)\. ", text.split("## Exercises")[1].split("## Answers")[0], re.MULTILINE):
-        assert f"\n**{number}.**" in text.split("## Answers")[1]
-    assert "plt." in code
+    learnt = text.split("**What was learnt.**")[1].split("\n\n")[0]
+    assert len(re.findall(r"[.?]( |$)", learnt)) == 3  # sentences
+    exercises, answers = text.split("## Exercises")[1].split("## Answers")
+    for line in exercises.strip().splitlines():
+        number = re.fullmatch(r"(\d)\. \((?:easy|medium|hard)\) .* \*Find: .*\.\*", line)
+        assert number, line
+        assert f"\n**{number[1]}.**" in answers
     assert "assert " in code
     for target in re.findall(r"\]\(([^)#]+)\)", text):
         assert target.startswith("https://") or (path.parent / target).exists()
+
+
+@each
+def test_has_a_movie_something_to_change_and_captions(path):
+    cells = nbformat.read(path, as_version=4).cells
+    code = "\n".join(cell.source for cell in cells if cell.cell_type == "code")
+    assert "film(" in code
+    assert "slide(" in code or re.search("#.*change (it|[A-Z]+|them)\\b", code)
+    captions = [
+        int(number)
+        for cell in cells
+        for number in re.findall(r'(?:^|\n)\*Figure (\d+)\. |f?"Figure (\d+)\. ', cell.source)
+        for number in number
+        if number
+    ]
+    assert captions == list(range(1, len(captions) + 1))
+    drawn = [
+        cell
+        for cell in cells
+        if cell.cell_type == "code" and re.search(r"film\(|slide\(|figures\.motion\(|plt\.(subplots|figure|plot|semilogy|loglog)\(", cell.source)
+    ]
+    assert len(captions) == len(drawn)
 
 
 @pytest.mark.slow

@@ -51,7 +51,7 @@ def film(shown: Result | Animation, caption: str, fps: int = 20, **style: Any) -
     shown : a run, drawn as by `run.animate`, or an animation; the figure of an animation is closed.
     caption : what is to be seen.
     fps : pictures per second.
-    style : of a run, as for `run.animate`; size is (640, 360) pixels if it is not given.
+    style : of a run, as for `run.animate`; size is (512, 288) pixels if it is not given.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def film(shown: Result | Animation, caption: str, fps: int = 20, **style: Any) -
         if isinstance(shown, Animation):
             _write(shown, path, fps)
         else:
-            animate(shown, path, fps, progress=False, **({"size": (640, 360)} | style))
+            animate(shown, path, fps, progress=False, **({"size": (512, 288)} | style))
         return Film(path.read_bytes(), caption)
 
 
