@@ -10,6 +10,8 @@ NotebookClient = pytest.importorskip("nbclient", reason="needs the group pages")
 
 NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
 SHORT = ("04-n-to-infinity",)  # of every package, run by `make test`
+CAPTION = r'(?:^\*|\n\*|")Figure (\d+)\. '
+DRAWS = r"film\(|slide\(|figures\.motion\(|plt\.(subplots|figure|plot|semilogy|loglog)\("
 each = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
 
 
@@ -53,19 +55,9 @@ def test_has_a_movie_something_to_change_and_captions(path):
     code = "\n".join(cell.source for cell in cells if cell.cell_type == "code")
     assert "film(" in code
     assert "slide(" in code or re.search("#.*change (it|[A-Z]+|them)\\b", code)
-    captions = [
-        int(number)
-        for cell in cells
-        for number in re.findall(r'(?:^|\n)\*Figure (\d+)\. |f?"Figure (\d+)\. ', cell.source)
-        for number in number
-        if number
-    ]
+    captions = [int(number) for cell in cells for number in re.findall(CAPTION, cell.source)]
     assert captions == list(range(1, len(captions) + 1))
-    drawn = [
-        cell
-        for cell in cells
-        if cell.cell_type == "code" and re.search(r"film\(|slide\(|figures\.motion\(|plt\.(subplots|figure|plot|semilogy|loglog)\(", cell.source)
-    ]
+    drawn = [cell for cell in cells if cell.cell_type == "code" and re.search(DRAWS, cell.source)]
     assert len(captions) == len(drawn)
 
 
