@@ -131,7 +131,7 @@ class Stage:
 
     def _set_up(self) -> None:
         scale = self.size[0] / 1280
-        figure = Figure(figsize=(self.size[0] / 100, self.size[1] / 100), dpi=100, layout="none")
+        figure = Figure(figsize=(self.size[0] / 100, self.size[1] / 100), dpi=100, layout="none")  # type: ignore[arg-type]  # whatever matplotlibrc says
         self._canvas = FigureCanvasAgg(figure)
         ax = figure.add_axes((0, 0, 1, 1))
         ax.set_axis_off()
