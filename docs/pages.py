@@ -77,7 +77,7 @@ def gallery() -> tuple[str, dict[str, bytes]]:
         source = path.read_text(encoding="utf-8")
         title, _, words = (ast.get_docstring(ast.parse(source)) or path.stem).partition(": ")
         code = source.split('"""', 2)[2].strip()
-        page += f"\n## {title}\n\n{words}\n\n```python\n{code}\n```\n"
+        page += f"\n## {title}\n\n{words[:1].upper()}{words[1:]}\n\n```python\n{code}\n```\n"
         for drawn in sorted(DRAWN.glob(f"{path.stem}.*")):
             pictures[drawn.name] = drawn.read_bytes()
             page += f"\n![{title}](gallery/{drawn.name})\n"

@@ -1,4 +1,4 @@
-"""The paper's rod, let go: it untwists, rolls and turns. 33 discs from above, and six more views."""
+"""The paper's rod, let go: it untwists, rolls and turns. 33 discs from above, and five more panels."""
 
 from discs import simulate
 from discs.chains.twist import untwisting_chain
