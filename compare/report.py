@@ -16,6 +16,7 @@ from compare import figures
 from compare.background import background
 from compare.hardcases.table import stability
 from compare.limit_figures import limits_of_all
+from compare.lump import lump
 from compare.main_job import INSTANTS, LONG, energy_runs
 from compare.outputs import fresh_files
 from compare.page import Page, table
@@ -26,10 +27,13 @@ from compare.results import Study
 from compare.study import convergence
 from continuum import Scene, solve, untwisting_rod
 from discs import Problem, Solution, checks
+from discs.analysis import Growth, growth
 from discs.chains.rolling import ROLLING
 from discs.pictures import geometry
 
 SIZES = (17, 33, 65, 129, 257)
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)  # of which the horizon is said
+LATER = 10  # durations of the scene in which it is looked for
 FRAMES = 97  # of the fields, among them the instants of their pictures
 LAWS = {name: law.formula for name, law in ROLLING.items()}
 PACKAGES = ("numpy", "scipy", "matplotlib", "numba", "scikit-sundae", "rolling-discs")
@@ -79,6 +83,7 @@ def report(
         fields = {law: solve(scene, tol, frames=FRAMES, progress=False) for law, scene in scenes.items()}
         later = {law: _studied(scene, sizes, fields[law], beside) for law, scene in scenes.items()}
         ground = beside.submit(_of_the_ground, scenes["field"], sizes, min(tol, 1e-6))
+        errors = beside.submit(_of_errors, scenes["field"], timed)
         _scene(page, scenes["field"])
         _motion(page, scenes, fields)
         stage("N to infinity")
@@ -89,6 +94,7 @@ def report(
         _energy(page, energies.result(), first)
         stage("speed against error")
         _speed(page, scenes["field"], timed)
+        _horizon(page, errors.result(), scenes["field"].duration, timed)
         stage("stability")
         _stability(page, beside, progress)
         stage("page")
@@ -208,6 +214,22 @@ def _speed(page: Page, scene: Scene, n: int) -> None:
     page.add("## Speed against error", "`python -m compare precision` measures more sizes, laws and peers.", found.speedups())
     caption = f"Our methods with thick lines, SciPy's and SUNDIALS' with dashed ones, N = {n}."
     page.figure("precision", found.plot()[0], caption, ("method", "setting", "error", "seconds", "remark"), rows)
+
+
+def _of_errors(scene: Scene, n: int) -> Growth:
+    return growth(lump(replace(scene, duration=LATER * scene.duration), n), method="midpoint", most=1 / min(TOLERANCES))
+
+
+def _horizon(page: Page, found: Growth, duration: float, n: int) -> None:
+    end, last = float(np.interp(duration, found.t, found.growth)), found.t[-1]
+    times = [(f"{tol:.0e}", found.horizon(tol)) for tol in TOLERANCES]
+    page.add(
+        "### How long a tolerance lasts",
+        f"Errors of the start, in positions over the length of the chain and in angles, are {end:.3g} times as large at "
+        f"t = {duration:g}, N = {n}. From its horizon on a run to a tolerance means nothing: an error of that size at the start "
+        "has grown to 1.",
+        table(("tolerance", "horizon"), [(tol, f"t = {t:.3g}" if t < np.inf else f"after t = {last:.3g}") for tol, t in times]),
+    )
 
 
 def _stability(page: Page, executor: Executor, progress: bool) -> None:

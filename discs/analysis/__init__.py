@@ -2,6 +2,7 @@
 
 from discs.analysis.adjoint import gradient
 from discs.analysis.branch import Branch, relative_equilibria
+from discs.analysis.horizon import Growth, growth, horizon
 from discs.analysis.linear import Linearised, linearise
 from discs.analysis.lyapunov import Exponents, lyapunov
 from discs.analysis.modes import Modes, modes
@@ -11,11 +12,14 @@ from discs.analysis.steady import Steady, steady
 __all__ = [
     "Branch",
     "Exponents",
+    "Growth",
     "Linearised",
     "Modes",
     "Steady",
     "equilibrium",
     "gradient",
+    "growth",
+    "horizon",
     "linearise",
     "lyapunov",
     "modes",

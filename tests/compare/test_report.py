@@ -1,5 +1,6 @@
 """The report in a real browser, from the file system and without a network."""
 
+import importlib
 import re
 import shutil
 import tempfile
@@ -27,6 +28,7 @@ FLAGS = (
 
 @contextmanager
 def here(processes=1):
+    importlib.import_module("numba")  # two threads that import it at once may hang
     with ThreadPoolExecutor(1) as executor:
         yield executor
 
@@ -77,6 +79,15 @@ def test_every_picture_has_its_data(written):
     headings = "The scene", "The motion", "N → ∞", "The force of the ground", "The paper's law", "Energy", "Speed", "Hard cases"
     for heading in (*headings, "Made with"):
         assert f"## {heading}" in page
+
+
+def test_horizons_of_tolerances(written):
+    """Errors grow; small tolerances last longer than ten durations."""
+    page = (written / "report.md").read_text(encoding="utf-8").split("### How long a tolerance lasts")[1].split("## Hard")[0]
+    assert float(re.search(r"are ([\d.]+) times as large at t = 4\.5, N = 9", page)[1]) > 5
+    last = {tol: float(t) for tol, t in re.findall(r"\| (1e-\d+) \| (?:t =|after t =) ([\d.]+) \|", page)}
+    assert list(last) == ["1e-01", "1e-02", "1e-03", "1e-04", "1e-06"]
+    assert last["1e-01"] < last["1e-06"] == 45.0
 
 
 def test_page_needs_nothing_beside_it(written, tmp_path, browser):

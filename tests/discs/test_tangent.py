@@ -176,8 +176,28 @@ def test_spectrum_of_a_chain_is_symmetric():
     found = lyapunov(problem, count=16, dt=0.2, method="midpoint")
     assert abs(found.exponent.sum()) < 1e-3
     off = found.exponent + found.exponent[::-1]
-    assert (np.abs(off) < 4 * np.hypot(found.error, found.error[::-1])).all()
+    assert (np.abs(off) < found.error + found.error[::-1]).all()
+    assert (found.error < 0.3).all()
     assert found.finite.shape == found.growth.shape == (60, 16)
+
+
+@pytest.mark.parametrize("omega", [0.0, 0.6])
+def test_error_bars_cover_the_exponents_of_a_regular_motion(omega):
+    """By the unit law a straight ring is stable: all exponents are zero, while changes grow like t and vectors turn slowly."""
+    problem = rolling_ring(omega)
+    problem = replace(problem, chain=replace(problem.chain, rolling="unit"), duration=60.0)
+    found = lyapunov(problem, count=20, dt=0.2, method="midpoint")
+    assert (np.abs(found.exponent) < found.error).all()
+    assert found.exponent[0] > 0.01  # the transient, which the bar must contain
+    assert (found.error < 0.15).all()
+
+
+def test_error_bars_cover_the_rates_of_an_unstable_motion():
+    problem = replace(rolling_ring(0.6), duration=40.0)
+    fastest = np.sort(modes(problem, count=16).rate.real)[-2:]
+    found = lyapunov(problem, count=2, dt=0.15, method="midpoint")
+    assert (np.abs(found.exponent - fastest) < found.error).all()
+    assert (found.error < 0.3 * fastest).all()
 
 
 def test_bad_input():
