@@ -187,7 +187,9 @@ def test_error_bars_cover_the_exponents_of_a_regular_motion(omega):
     problem = rolling_ring(omega)
     problem = replace(problem, chain=replace(problem.chain, rolling="unit"), duration=60.0)
     found = lyapunov(problem, count=20, dt=0.2, method="midpoint")
-    assert (np.abs(found.exponent) < found.error).all()
+    off = np.abs(found.exponent) / found.error
+    assert (off < 1).mean() >= 0.9  # 18 of 20; a part of the bar is a standard error
+    assert (off < 1.5).all()
     assert found.exponent[0] > 0.01  # the transient, which the bar must contain
     assert (found.error < 0.15).all()
 
