@@ -6,8 +6,8 @@ largest first.
 
 No motion is followed for ever, so each exponent has an error bar, a sum of two:
 
-* The time is cut into blocks; the standard error of their means tells of chance. It is too small if the motion remembers longer than
-  a block.
+* The time is cut into blocks; the standard error of their means tells of chance. It is too small if the motion remembers longer
+  than a block.
 * The vectors turn to their directions slowly: to those of a regular motion, whose changes grow like t, with means like log(t)/t.
   A transient that adds c to the logarithm of growth shifts the mean over the time T by c/T. If it is over in the first third, the
   means of the thirds differ by 3 c/T; if it goes on like log t, from T/10 to T, by 1.3 times that shift. So the largest difference
