@@ -76,7 +76,8 @@ def growth(problem: Problem, dt: float | None = None, method: str = "gauss4", mo
         y, tangent = flow.step(y, i * h, h)
         errors = tangent.forward(errors)
         found.append(float(np.linalg.norm(errors[: unit.size] / unit[:, None], 2)))
-    return Growth(h * np.arange(len(found)), np.array(found), h)
+    t: Float = h * np.arange(len(found))
+    return Growth(t, np.array(found), h)
 
 
 def horizon(problem: Problem, tolerance: float, dt: float | None = None, method: str = "gauss4") -> float:
