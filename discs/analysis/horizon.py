@@ -76,7 +76,7 @@ def growth(problem: Problem, dt: float | None = None, method: str = "gauss4", mo
         y, tangent = flow.step(y, i * h, h)
         errors = tangent.forward(errors)
         found.append(float(np.linalg.norm(errors[: unit.size] / unit[:, None], 2)))
-    t: Float = h * np.arange(len(found))
+    t: Float = h * np.arange(float(len(found)))
     return Growth(t, np.array(found), h)
 
 
