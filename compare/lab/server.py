@@ -162,7 +162,7 @@ class Part(Guarded):
         self.set_header("Content-Type", kind)
         self.set_header(
             "Content-Security-Policy",
-            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; base-uri 'none'; form-action 'none'; "
+            "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
             f"frame-ancestors 'none'; connect-src {' '.join(f'ws://{host}' for host in self.lab.hosts)}",
         )
         self.finish(text())

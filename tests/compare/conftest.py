@@ -1,6 +1,10 @@
-"""What tests of sweeps share."""
+"""What tests of sweeps share, and the browser of those of the lab."""
 
 import pytest
+
+from tests.discs.conftest import browser
+
+__all__ = ["browser"]
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ function render({ model, el, whole = false }) {
   const rewind = make("input", { type: "range", min: 0, max: 0, step: "any", value: 0, "aria-label": "time; go back to an earlier one" });
   const time = make("output", { className: "time" }, "t = 0.00");
   const speed = make("select", {}, ...[0.1, 0.25, 0.5, 1, 2, 4].map((value) => make("option", { value, selected: value === 1 }, String(value))));
-  const view = make("button", {}, "Reset view");
+  const view = make("button", { className: "view" }, "Reset view");
   const chosen = {
     scene: make("select"), n: make("input", { type: "number", min: 2, step: 1, inputMode: "numeric" }), rolling: make("select"), ends: make("select"),
     method: make("select"), dt: make("select"),
@@ -50,10 +50,10 @@ function render({ model, el, whole = false }) {
   const message = make("div", { className: "message", role: "alert", hidden: true }, said, dismiss);
   const plots = ["energy", "error"].map((name) => ({ canvas: make("canvas", { role: "img", "aria-label": `${name} against time` }), numbers: make("div", { className: "numbers" }) }));
   const about = make("p", { className: "soft" });
-  element.append(...titles, legend, message);
+  element.append(...titles, legend, view, message);
   root.append(make("div", { className: "all" },
     make("div", { className: "top" }, element,
-      make("div", { className: "bar" }, play, back, step, reset, rewind, time, named("speed ", speed), view)),
+      make("div", { className: "bar" }, play, back, step, reset, rewind, time, named("speed ", speed))),
     make("div", { className: "plots" }, ...plots.map(({ canvas, numbers }) => make("div", { className: "plot" }, numbers, canvas))),
     make("div", { className: "side" },
       group("Scene", make("div", { className: "pairs" }, ...Object.entries(chosen).map(([name, control]) => named(names[name], control)))),
@@ -115,7 +115,7 @@ function render({ model, el, whole = false }) {
   }
 
   function sliderOf({ name, label, again }) {
-    const input = make("input", { type: "range" }), output = make("output");
+    const input = make("input", { type: "range", "aria-label": label }), output = make("output");
     input.oninput = () => {
       moved = moved || performance.now();
       output.textContent = Number(input.value).toPrecision(3);
@@ -144,7 +144,7 @@ function render({ model, el, whole = false }) {
     const n = frame.n, length = scene.length;
     const points = Array.from({ length: n }, (_, i) => [frame.rows.x[i], frame.rows.y[i]]);
     const mid = [0, 1].map((k) => points.reduce((sum, p) => sum + p[k], 0) / n);
-    stage.show([...points, [mid[0], mid[1] - 0.35 * length], [mid[0], mid[1] + 0.35 * length]]);
+    stage.show([...points, [mid[0], mid[1] - 0.2 * length], [mid[0], mid[1] + 0.2 * length]]);
     for (const each of panels) stage.drop(each);
     panels = [0, 1].map(() => stage.build(n, Number(scene.ring), new Float32Array(6 * n * TRAIL)));
     arrows = stage.rods(panels[0].scene, 2 * n + 1, 0.5);
@@ -334,6 +334,7 @@ function render({ model, el, whole = false }) {
   compare.onchange = () => ask({ kind: "compare", on: compare.checked });
   for (const [name, control] of Object.entries(chosen)) {
     control.onchange = () => {
+      if (control.value === "") return;
       const value = ["n", "dt"].includes(name) ? Number(control.value) : control.value;
       if (!["method", "dt"].includes(name)) { clear(); frame = null; }
       tell("");
@@ -452,7 +453,7 @@ function render({ model, el, whole = false }) {
     stats.frames += 1;
     if (stats.asked) { stats.slider.push(performance.now() - stats.asked); stats.asked = 0; }
   });
-  if (whole) globalThis.discs = { stats, get panels() { return panels; }, get stage() { return stage; }, get frame() { return frame; }, get scene() { return scene; } };
+  if (whole) globalThis.discs = { stats, get idle() { return !waiting && !queue.length && !latest.size; }, get panels() { return panels; }, get stage() { return stage; }, get frame() { return frame; }, get scene() { return scene; } };
   if (matchMedia("(prefers-reduced-motion: reduce)").matches) pause(true);
   send({ kind: "open" });
   return () => { // the cell or the page is gone
