@@ -239,6 +239,11 @@ function render({ model, el, whole = false }) {
     const j = frame.pulled ? scene.discs.indexOf(frame.pulled[0]) : -1;
     stage.lay(arrows, 2 * n, j < 0 ? [0, 0, 0] : [x[j], y[j], R], j < 0 ? [0, 0, 0] : [frame.pulled[1], frame.pulled[2], R]);
     stage.render(panels.slice(0, stage.count));
+    if (frame.stopped) { tell(`The motion cannot go on: ${frame.stopped}`); pause(true); }
+  }
+
+  function write() { // what is read and not watched: a few times a second
+    const R = scene.radius;
     plot();
     time.textContent = `t = ${frame.t.toFixed(2)}`;
     Object.assign(rewind, { min: frame.first, max: Math.max(frame.last, frame.t) });
@@ -249,7 +254,6 @@ function render({ model, el, whole = false }) {
     titles[1].children[0].textContent = stage.count === 2 ? "the field" : "";
     doHold.textContent = frame.held.includes(Number(disc.value)) ? "Let it go" : "Hold it";
     about.textContent = `Radius drawn ${R.toPrecision(3)}. The ${frame.engine === "plain" ? "plain engine: kernels are being read or compiled" : "compiled engine"}.`;
-    if (frame.stopped) { tell(`The motion cannot go on: ${frame.stopped}`); pause(true); }
   }
 
   // ---- plots
@@ -267,9 +271,13 @@ function render({ model, el, whole = false }) {
   }
   function curves(canvas, lines) {
     const ratio = window.devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight, edge = 6;
-    canvas.width = width * ratio; canvas.height = height * ratio;
-    const pen = canvas.getContext("2d"), t = history.t;
-    pen.scale(ratio, ratio);
+    const pen = canvas.getContext("2d", { willReadFrequently: true }), t = history.t; // drawn without the graphics card, which is busy
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio))
+      Object.assign(canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    pen.setLineDash([]);
+    pen.lineWidth = 1;
     let low = 0, high = 1e-300;
     for (const values of lines) for (const v of values) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
     const start = t[0] ?? 0, end = Math.max(t.at(-1) ?? 1, start + 1e-9);
@@ -417,10 +425,10 @@ function render({ model, el, whole = false }) {
   // ---- drawing; where it takes longer than a thirtieth of a second, with fewer pixels
   let slow = 0, drawn = 0;
   function coarsen(now) {
-    slow = playing && now - drawn > 40 && now - drawn < 500 ? slow + 1 : Math.max(0, slow - 1);
+    slow = playing && now - drawn > 40 ? slow + 1 : Math.max(0, slow - 1);
     drawn = now;
     const ratio = stage.renderer.getPixelRatio();
-    if (slow < 12 || ratio <= 0.5) return;
+    if (slow < 8 || ratio <= 0.5) return;
     slow = 0;
     stage.renderer.setPixelRatio(Math.max(0.5, 0.7 * ratio));
     stage.resize();
@@ -441,13 +449,16 @@ function render({ model, el, whole = false }) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const repaint = () => { if (stage) { stage.paint(panels); arrows?.material.color.set(tone("push")); } };
   dark.addEventListener("change", repaint);
-  let alive = true;
+  let alive = true, written = 0, unwritten = false;
   requestAnimationFrame(function each(now) {
     if (!alive) return;
     requestAnimationFrame(each);
     pump(now);
-    if (!stage?.stale || !frame || !panels.length) return;
+    if (!frame || !panels.length) return;
+    if (unwritten && (now - written > 120 || !playing)) { unwritten = false; written = now; write(); }
+    if (!stage?.stale) return;
     stage.stale = false;
+    unwritten = true;
     draw();
     coarsen(now);
     stats.frames += 1;

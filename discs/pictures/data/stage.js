@@ -7,7 +7,7 @@
 function makeStage({ element, count, radius: R, style, tone, live = false }) {
   // what is live is drawn with fewer corners, and without smooth edges where no graphics card helps
   const renderer = new THREE.WebGLRenderer({ antialias: !live || !drawnBySoftware(), preserveDrawingBuffer: !live });
-  const around = live ? 32 : 48;
+  const around = live ? 24 : 48;
   renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
   renderer.setScissorTest(true);
   renderer.domElement.setAttribute("aria-hidden", "true");
