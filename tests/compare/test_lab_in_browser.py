@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from tests.conftest import longer
 from tests.discs.test_view_for_readers import CONTRAST, device
 
 pytest.importorskip("tornado", reason="needs tornado, of the extra lab")
@@ -158,7 +159,7 @@ def test_the_field_comes_beside(page):
     control(page, "Play").click()
     until(page, "discs.frame.error")
     assert ask(page, "discs.stage.count") == 2
-    assert "distance from the field" in page.find_element("css selector", ".plots").text
+    until(page, "document.querySelector('.plots').textContent.includes('distance from the field')")
     assert ask(page, "discs.frame.error.place") < 0.2
     control(page, "the field beside").click()
     until(page, "discs.stage.count === 1")
@@ -172,8 +173,9 @@ def test_copies_and_saves(page):
     until(page, "document.querySelector('pre').textContent.includes('import simulate')")
 
 
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("width", "height", "scheme"), [(1280, 800, "dark"), (390, 844, "light"), longer(1280, 800, "light"), longer(390, 844, "dark")]
+)
 def test_can_be_read_and_touched(page, address, width, height, scheme):
     with device(page, width, height, prefers_color_scheme=scheme, prefers_reduced_motion="reduce"):
         page.get(address)
