@@ -23,7 +23,7 @@ from continuum import untwisting_rod
 from continuum.files import read_scene
 from discs import command_line
 from discs.chains.rolling import ROLLING
-from discs.kernels.background import wait_for_kernels
+from discs.kernels.background import compiling_aside, wait_for_kernels
 
 
 def parser() -> argparse.ArgumentParser:
@@ -274,7 +274,7 @@ def run_main_job(options: argparse.Namespace) -> None:
     scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
     measured, speeds = None, ""
     own_headings = not options.scene and not options.no_limits
-    with background() as executor:
+    with compiling_aside(), background() as executor:
         studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor, options.degree)
         print(summary(studies))
         print(

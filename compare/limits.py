@@ -95,17 +95,18 @@ def locking(stiffness: tuple[float, ...] = LOCKING, n: int = 33) -> Float:
 
 
 class Effort(NamedTuple):
-    """Discs that reach an error: order, number, error of any field (length, rad) and processor time of the run, s."""
+    """Discs that reach an error: order, number, error of any field (length, rad), processor time of the run, s, and its engine."""
 
     order: int
     n: int
     error: float
     seconds: float
+    engine: str
 
 
 def effort(study: Study, field: Solution, degree: int, error: float = REACHED, steps: int = 30, rounds: int = 5) -> Effort:
     """About the fewest discs, near those of a study's law, that reach an error well above the field's own; the fastest of some
-    rounds of gauss8 steps."""
+    rounds of gauss8 steps. Plain runs, which are slow, are not repeated."""
     scene, method, error = study.scene, Gauss8(tolerance=1e-13), max(error, 4 * study.floor)
     n, found = study.reaching(error) - 2, np.inf
     n += degree == 2 and n % 2 == 0
@@ -114,12 +115,12 @@ def effort(study: Study, field: Solution, degree: int, error: float = REACHED, s
         problem = lump(scene, n, degree=degree)
         run = simulate(problem, method, scene.duration / steps, frames=1, progress=False)
         found = float(apart(scene, run, field).max())
-    seconds = np.inf
-    for _ in range(rounds):
+    seconds, engine = np.inf, str(run.stats["engine"])
+    for _ in range(rounds if engine == "compiled" else 1):
         began = time.process_time()
         simulate(problem, method, scene.duration / steps, frames=1, progress=False)
         seconds = min(seconds, time.process_time() - began)
-    return Effort(2 * degree, n, found, seconds)
+    return Effort(2 * degree, n, found, seconds, engine)
 
 
 def limits(
@@ -146,10 +147,10 @@ def limits(
         for d in (unit, *paper):
             for a, g, j, apart in zip(d.stretch, d.shear, d.inertia, d.distance, strict=True):
                 rows.append((d.against, f"{a:g}", f"{g:g}", f"{j:g}", *(f"{v:.3e}" for v in apart)))
-        efforts: list[tuple[str, ...]] = [("order", "N", "error", "ms")]
+        efforts: list[tuple[str, ...]] = [("order", "N", "error", "ms", "engine")]
         for degree, study in enumerate(studies, 1):
             e = effort(study, field, degree)
-            efforts.append((str(e.order), str(e.n), f"{e.error:.1e}", f"{1e3 * e.seconds:.3g}"))
+            efforts.append((str(e.order), str(e.n), f"{e.error:.1e}", f"{1e3 * e.seconds:.3g}", e.engine))
         locks: list[tuple[str, ...]] = [("A = G", "largest motion")]
         locks += [(f"{a:g}", f"{r:.4f}") for a, r in zip(LOCKING, reach, strict=True)]
         table = [studies[0].columns, *(row for study in studies for row in study.rows())]

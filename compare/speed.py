@@ -10,6 +10,7 @@ from compare.precision import work_precision
 from compare.work_precision import WorkPrecision
 from continuum import Scene
 from discs import Problem, simulate
+from discs.running.engine import WAITING
 
 SIZES = 33, 129
 OURS = "midpoint", "gauss6", "auto"
@@ -33,7 +34,9 @@ def speed(scene: Scene, progress: bool = True) -> tuple[WorkPrecision | None, st
         for method in COMPILED:
             first = simulate(replace(problem, duration=problem.duration / 100), method, problem.duration / 100, 1, progress=False)
             if first.stats["engine"] != "compiled":
-                return None, f"none, as it needs compiled runs, and a run was plain: {first.stats['plain_because']}"
+                because = first.stats["plain_because"]
+                again = "; run it again in some minutes" if because == WAITING else ""
+                return None, f"none, as it needs compiled runs, and a run was plain: {because}{again}"
     if not problems[0].energy():
         return None, "none, as nothing moves"
     found = work_precision(scene, SIZES, _others, 1, SECONDS, progress, own=_own)

@@ -2,7 +2,7 @@
 
 A process is started by the first run that finds a kernel missing, and is sent functions to call, one after the other: each calls
 its kernels once, which compiles them into the cache on disc. It outlives the run that started it, until they are all there. Worker
-processes, and machines without a cache, wait for their kernels instead.
+processes wait for their kernels instead, unless `compiling_aside`; so do machines without a cache.
 """
 
 import multiprocessing
@@ -12,14 +12,15 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
 from discs.kernels.compiled import NotReady, readily, uncached
 
 ENGINE = "DISCS_ENGINE"  # in the environment: the engine of runs that are given none
+ASIDE = "DISCS_COMPILE_ASIDE"  # in the environment, so that worker processes inherit it; see `compiling_aside`
 SECONDS = 1.0  # between two looks whether kernels are there
 USUAL = [os.environ.get(ENGINE) or "auto"]  # that engine
 
@@ -32,6 +33,22 @@ def usual() -> str:
 def wait_for_kernels() -> None:
     """Runs that are given no engine wait for their kernels, as where times are measured. DISCS_ENGINE goes first."""
     USUAL[0] = os.environ[ENGINE] = os.environ.get(ENGINE) or "compiled"
+
+
+@contextmanager
+def compiling_aside() -> Iterator[None]:
+    """Within it kernels are compiled in the background at the lowest priority, and worker processes do not wait for them either.
+
+    For jobs that plain runs finish before their kernels would be there.
+    """
+    before = os.environ.get(ASIDE)
+    os.environ[ASIDE] = "yes"
+    try:
+        yield
+    finally:
+        os.environ.pop(ASIDE)
+        if before is not None:
+            os.environ[ASIDE] = before
 
 
 class _Compiler:
@@ -48,7 +65,7 @@ class _Compiler:
             if self.process is None:
                 environment = os.environ | {ENGINE: "compiled", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
                 self.process = subprocess.Popen(
-                    [sys.executable, "-m", "discs.kernels.background"],
+                    [sys.executable, "-m", "discs.kernels.background", *["aside"] * (ASIDE in os.environ)],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,
@@ -81,8 +98,8 @@ COMPILER = _Compiler()
 def missing(prepare: Callable[..., object], *arguments: Any, compiles: bool = True) -> bool:
     """Whether kernels that prepare(*arguments) calls are missing; they are then compiled in the background, if `compiles`.
 
-    prepare is a function of a module, with arguments that can be pickled. If they cannot, in a worker process, and if the process
-    has failed, nothing is missing: the caller waits for its kernels.
+    prepare is a function of a module, with arguments that can be pickled. If they cannot, in a worker process unless
+    `compiling_aside`, and if the process has failed, nothing is missing: the caller waits for its kernels.
     """
     try:
         with readily():
@@ -90,7 +107,7 @@ def missing(prepare: Callable[..., object], *arguments: Any, compiles: bool = Tr
     except NotReady:
         if not compiles:
             return True
-        if uncached or multiprocessing.parent_process() is not None:
+        if uncached or (multiprocessing.parent_process() is not None and ASIDE not in os.environ):
             return False
         try:
             job = pickle.dumps((prepare, arguments))
@@ -127,4 +144,6 @@ def _serve() -> None:
 
 
 if __name__ == "__main__":
+    if "aside" in sys.argv and hasattr(os, "nice"):
+        os.nice(19)
     _serve()

@@ -81,6 +81,19 @@ def test_a_worker_process_waits(empty_cache, monkeypatch):
     assert empty_cache.process is None
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "getpriority"), reason="no priorities on this system")
+def test_aside_a_worker_does_not_wait_and_kernels_are_compiled_at_the_lowest_priority(empty_cache, monkeypatch):
+    monkeypatch.setattr(multiprocessing, "parent_process", lambda: "a process")
+    with background.compiling_aside():
+        assert missing(prepare_slowly, 1.5, "")
+    until = time.monotonic() + 60
+    while os.getpriority(os.PRIO_PROCESS, empty_cache.process.pid) < 19:
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    assert background.ASIDE not in os.environ
+
+
 def test_what_cannot_be_sent_is_waited_for(empty_cache):
     assert not missing(lambda x: doubled(x), 1.5)
     assert empty_cache.process is None
