@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from discs.kernels.compiled import NotReady, readily, uncached
@@ -144,6 +145,9 @@ def _serve() -> None:
 
 
 if __name__ == "__main__":
-    if "aside" in sys.argv and hasattr(os, "nice"):
-        os.nice(19)
+    if "aside" in sys.argv:
+        with suppress(AttributeError, OSError):
+            os.nice(19)
+        with suppress(OSError):  # Linux may share processors among sessions first, and this process has one of its own
+            Path("/proc/self/autogroup").write_text("19")
     _serve()

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,6 +92,11 @@ def test_aside_a_worker_does_not_wait_and_kernels_are_compiled_at_the_lowest_pri
     while os.getpriority(os.PRIO_PROCESS, empty_cache.process.pid) < 19:
         assert time.monotonic() < until
         time.sleep(0.1)
+    group = Path(f"/proc/{empty_cache.process.pid}/autogroup")
+    while group.exists() and not group.read_text().endswith("nice 19\n"):
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    empty_cache.process.kill()  # it might wait for long
     assert background.ASIDE not in os.environ
 
 
