@@ -227,14 +227,15 @@ def precision(study: WorkPrecision) -> list[Axes]:
     names = list(dict.fromkeys(name for name, _ in study.problems))
     sizes = list(dict.fromkeys(n for _, n in study.problems))
     peers = list(dict.fromkeys(r.method for r in study.rows if not r.ours))
-    own = sorted({r.method for r in study.rows if r.ours}, key=[*METHOD].index)
+    own = {r.method for r in study.rows if r.ours}
+    own_in_order = [*(method for method in METHOD if method in own), *sorted(own - set(METHOD))]
     columns = len(sizes) if len(names) > 1 else min(len(sizes), 2)  # a single problem fills a page's width
     rows = -(-len(names) * len(sizes) // columns)
     figure = Figure(figsize=(1.5 + 3.3 * max(columns, 2), 1.8 + 3.4 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     shown: dict[str, Any] = {}
     for ax, (name, n) in zip(grid.ravel(), ((name, n) for name in names for n in sizes), strict=False):
-        for method in (*peers, *own):
+        for method in (*peers, *own_in_order):
             errors, seconds = study.curve(name, n, method)
             if errors.size:
                 shown.setdefault(method, ax.loglog(seconds, errors, **look(method))[0])
@@ -244,7 +245,7 @@ def precision(study: WorkPrecision) -> list[Axes]:
         ax.set_xlabel("processor time (s)")
     for ax in grid[:, 0]:
         ax.set_ylabel("relative error of x, y, θ")
-    order = [m for m in (*own, *peers) if m in shown]
+    order = [m for m in (*own_in_order, *peers) if m in shown]
     lines = [shown[m] for m in order]
     figure.legend(lines, order, loc="outside lower center", ncols=6 if columns > 2 else 4, fontsize="small", frameon=False)
     return list(grid.ravel())

@@ -36,3 +36,9 @@ def test_what_else_is_drawn_leaves_a_line_as_it_is():
     assert alone < together
     assert look("gauss6")["zorder"] > look("SciPy BDF")["zorder"]
     assert np.isclose(look("a peer of yours")["linewidth"], look("SciPy BDF")["linewidth"])
+
+
+def test_a_method_of_ones_own_is_drawn_too():
+    study = WorkPrecision([Row("field", 8, name, True, 1.0, 1e-3, 1.0) for name in ("mine", "gauss6")], {}, {})
+    legend = figures.precision(study)[0].figure.legends[0]
+    assert [text.get_text() for text in legend.get_texts()] == ["gauss6", "mine"]
