@@ -73,9 +73,14 @@ def _write(animation: Animation, path: Path, fps: int) -> None:
     import imageio_ffmpeg  # its import searches for the program ffmpeg
     from matplotlib import pyplot, rc_context
 
+    figure: Figure = animation._fig  # type: ignore[attr-defined]
+    animation._init_draw()  # type: ignore[attr-defined]  # the first picture, with its title
+    if engine := figure.get_layout_engine():  # once, as it takes longer than a picture
+        engine.execute(figure)
+        figure.set_layout_engine("none")
     with rc_context({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}):
         animation.save(path, "ffmpeg", fps)
-    pyplot.close(animation._fig)  # type: ignore[attr-defined]  # a notebook would show it once more
+    pyplot.close(figure)  # a notebook would show it once more
 
 
 def slide(draw: Callable[..., Figure], **numbers: tuple[float, float, float, float]) -> None:
