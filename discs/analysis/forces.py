@@ -3,9 +3,11 @@
 A linear load is f = constant - damping v - stiffness q - B^T (viscosity) B v + sum_k signal_k(t) pattern_k. With w = C nu its
 parameters change M . df only by the sums over the states of w, w v, w q, (B w)(B v) and signal_k w, which one pass adds up. The
 arrays are affine in each parameter of a load, so their derivatives are differences. Those of signals are differences of order 4.
+For all other loads the whole force is taken by differences of order 4, at each state.
 """
 
 import re
+from abc import ABC, abstractmethod
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
@@ -23,50 +25,122 @@ from discs.problem import Problem
 PATH = re.compile(r"loads\[(\d+)\]\.(signal\.)?(\w+)")
 
 
-class LoadParameter:
+class LoadParameter(ABC):
     """A parameter of a load, "loads[0].pattern", or of its signal, "loads[0].signal.rate".
 
-    Raises ValueError where there is none, or where its derivative is not known here.
+    name : this name. value : the parameter, an array. place : of the load. owner, attribute : what has it.
     """
 
-    def __init__(self, problem: Problem, name: str) -> None:
-        found = PATH.fullmatch(name)
-        if not found or int(found[1]) >= len(problem.loads):
-            raise ValueError(
-                "a parameter of a load is 'loads[i].name' or 'loads[i].signal.name' with i below "
-                f"{len(problem.loads)}, the number of loads; got {name!r}"
-            )
-        load = problem.loads[int(found[1])]
-        bound = problem.bound[int(found[1])]
-        owner = getattr(load, "signal", None) if found[2] else load
-        names = [field.name for field in fields(owner)] if is_dataclass(owner) else []
-        if found[3] not in names:
-            raise ValueError(f"{name!r}: {type(owner).__name__} has the parameters {', '.join(names) or 'none'}")
-        if not isinstance(bound, Linear) or bound.bends is not None or bound.section is not None or bound.degree == 2:
-            raise ValueError(
-                f"{name!r}: derivatives are known for loads that are linear in positions and velocities; not for "
-                f"{type(load).__name__} here"
-            )
-        value = getattr(owner, found[3])
-        if callable(value):
-            raise ValueError(f"{name!r} is a function: give its values, as an array, to differentiate by them")
-        try:
-            self.value = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            raise ValueError(f"{name!r} is no number and no array: {checks.shown(value)}") from None
-        self.name, self._problem, self._load, self._bound = name, problem, load, bound
-        self._signal, self._attribute = owner if found[2] else None, found[3]
-        if self._signal is None and (other := self._other((0,) * self.value.ndim)) and (other.bends or other.section is not None):
-            raise ValueError(f"{name!r}: its force is not linear in positions; derivatives by it are not known here")
+    def __init__(self, problem: Problem, name: str, place: int, owner: Any, attribute: str, value: Float) -> None:
+        self.name, self.value = name, value
+        self._problem, self._place, self._owner, self._attribute = problem, place, owner, attribute
+        self._load, self._bound = problem.loads[place], problem.bound[place]
+        self._of_signal = owner is not self._load
+
+    @abstractmethod
+    def add(self, at: Passed) -> None:
+        """Add what these states contribute."""
+
+    @abstractmethod
+    def total(self) -> Float:
+        """The derivative, of the shape of the parameter."""
+
+    def _changed(self, place: tuple[int, ...], by: float) -> Any:
+        """The owner with one entry of the parameter changed."""
+        value = self.value.copy()
+        value[place] += by
+        return replace(self._owner, **{self._attribute: value if value.ndim else float(value)})
+
+    def _size(self, place: tuple[int, ...]) -> float:
+        return abs(float(self.value[place])) or 1.0
+
+
+def load_parameter(problem: Problem, name: str) -> LoadParameter:
+    """The parameter of this name. ValueError where there is none, or where it is no number."""
+    found = PATH.fullmatch(name)
+    if not found or int(found[1]) >= len(problem.loads):
+        raise ValueError(
+            "a parameter of a load is 'loads[i].name' or 'loads[i].signal.name' with i below "
+            f"{len(problem.loads)}, the number of loads; got {name!r}"
+        )
+    place = int(found[1])
+    load = problem.loads[place]
+    owner = getattr(load, "signal", None) if found[2] else load
+    names = [field.name for field in fields(owner)] if is_dataclass(owner) else []
+    if found[3] not in names:
+        raise ValueError(f"{name!r}: {type(owner).__name__} has the parameters {', '.join(names) or 'none'}")
+    value = getattr(owner, found[3])
+    if callable(value):
+        raise ValueError(f"{name!r} is a function: give its values, as an array, to differentiate by them")
+    try:
+        values = np.asarray(np.nan if value is None or isinstance(value, bool) else value, dtype=float)
+    except (TypeError, ValueError):
+        values = np.array(np.nan)
+    if np.isnan(values).any():
+        raise ValueError(f"{name!r} is no number and no array: {checks.shown(value)}")
+    given = problem, name, place, owner, found[3], values
+    if _linear(problem.bound[place]):
+        linear = LinearParameter(*given)
+        if linear.fits():
+            return linear
+    return AnyParameter(*given)
+
+
+def _linear(load: Any) -> bool:
+    """Whether a load is linear in positions and velocities, with arrays of its own for both."""
+    return isinstance(load, Linear) and load.bends is None and load.section is None and load.degree == 1
+
+
+class AnyParameter(LoadParameter):
+    """By differences of order 4 of the whole force at each state: rest curvature, viscosity of bending, loads of one's own.
+
+    Rest strains of several loads add up, so the force of one depends on the others.
+    """
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self._found, self._loads = np.zeros(self.value.shape), dict[tuple[tuple[int, ...], float], Any]()
+
+    def add(self, at: Passed) -> None:
+        for place in np.ndindex(self.value.shape):
+            for t, q, v, w in zip(at.t.tolist(), at.q, at.velocity, at.w, strict=True):
+
+                def force(by: float, place: tuple[int, ...] = place, t: float = t, q: Float = q, v: Float = v) -> Float:
+                    found: Float = self._all(place, by).applied(t, q, v)
+                    return found
+
+                self._found[place] += np.vdot(w, slope(force, self._size(place)))
+
+    def total(self) -> Float:
+        return self._found
+
+    def _all(self, place: tuple[int, ...], by: float) -> Any:
+        """All loads together, with one entry of the parameter changed."""
+        if (place, by) not in self._loads:
+            owner, loads = self._changed(place, by), list(self._problem.loads)
+            loads[self._place] = replace(self._load, signal=owner) if self._of_signal else owner  # type: ignore[call-arg, type-var]
+            self._loads[place, by] = replace(self._problem, loads=tuple(loads)).system.load
+        return self._loads[place, by]
+
+
+class LinearParameter(LoadParameter):
+    """By sums over the states, for a load that is linear in positions and velocities."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        bound, problem = self._bound, self._problem
         self._sums = {part: np.zeros_like(bound.constant) for part in ("constant", "damping", "stiffness")}
         self._viscous = np.zeros((len(bound.constant) - 2, problem.chain.n + 1))
         self._driven = np.zeros((len(bound.drives), *bound.constant.shape))
         self._by_signal = np.zeros(self.value.shape)
 
+    def fits(self) -> bool:
+        """Whether the load stays of this kind if the parameter is changed."""
+        return self._of_signal or _linear(self._other((0,) * self.value.ndim))
+
     def add(self, at: Passed) -> None:
-        """Add what these states contribute."""
         w = at.w
-        if self._signal is not None:
+        if self._of_signal:
             power = np.array([(drive.pattern * w).sum(axis=(1, 2)) for drive in self._bound.drives]).sum(axis=0)
             for place in np.ndindex(self.value.shape):
                 self._by_signal[place] += power @ self._slope(place, at.t)
@@ -79,20 +153,12 @@ class LoadParameter:
         for k, drive in enumerate(self._bound.drives):
             self._driven[k] += np.tensordot(signals.values(drive.signal, at.t, drive.name), w, 1)
 
-    def _changed(self, place: tuple[int, ...], by: float) -> Any:
-        value = self.value.copy()
-        value[place] += by
-        owner: Any = self._load if self._signal is None else self._signal
-        return replace(owner, **{self._attribute: value if value.ndim else float(value)})
-
     def _slope(self, place: tuple[int, ...], t: Float) -> Float:
         """The derivative of the signal at times (M,)."""
-        size = abs(float(self.value[place])) or 1.0
-        return slope(lambda by: signals.values(self._changed(place, by), t, self.name), size)
+        return slope(lambda by: signals.values(self._changed(place, by), t, self.name), self._size(place))
 
     def total(self) -> Float:
-        """The derivative, of the shape of the parameter."""
-        if self._signal is not None:
+        if self._of_signal:
             return self._by_signal
         found = np.zeros(self.value.shape)
         for place in np.ndindex(self.value.shape):

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from discs.analysis.forces import LoadParameter
+from discs.analysis.forces import load_parameter
 from discs.analysis.stages import At, Equations, Passed
 from discs.arrays import Float
 from discs.problem import Problem
@@ -54,7 +54,7 @@ class Parameters:
         self._equations, problem = equations, equations.problem
         self.by_disc = {name: np.zeros(problem.chain.n) for name in names if name in INERTIAS}
         self._springs = {name: Springs(problem, name) for name in names if name in STIFFNESSES}
-        self._loads = [LoadParameter(problem, name) for name in names if name.startswith("loads")]
+        self._loads = [load_parameter(problem, name) for name in names if name.startswith("loads")]
         self._stretched: Any = 0.0
         self._weight = weight(problem) if "density" in self.by_disc else None
         self.rates = bool(self._springs or self._loads) or self._weight is not None

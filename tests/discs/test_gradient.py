@@ -1,6 +1,6 @@
 """Gradients by the discrete adjoint: against differences of runs, and of what they are made of."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from discs.analysis import gradient, linearise
 from discs.analysis.duals import Dual
 from discs.integrators import Gauss4, Midpoint
 from discs.loads import Custom, Damping, Force, Linear, Motor, Rest, Slope, Spring, Torque, signals
+from discs.loads.binding import OnRod
 from tests.conftest import ALL, Model, longer, models, uneven
 
 LOADS = Slope(0.2, -0.4), Damping(rolling=0.3, torsion=0.1), Torque(0.3, signals.sine(1.0, 2.0)), Spring(1.0, 0.5, 0.8, at=1.0)
@@ -154,6 +155,37 @@ def test_gradients_by_loads_and_signals_are_those_of_differences():
         assert found[name][() if place is None else place] == pytest.approx(by, rel=3e-8, abs=3e-9), name
 
 
+@dataclass(frozen=True)
+class Cubic(OnRod):
+    """A load of one's own, not linear: a torque -strength theta^3."""
+
+    strength: float = 0.5
+
+    def on(self, chain):
+        return Custom(lambda t, q, v: np.concatenate([0 * q[:2], -self.strength * q[2:3] ** 3, 0 * q[3:]])).on(chain)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", [Model("consistent", "field"), Model("springs", "steered")], ids=["slaved", "own"])
+def test_gradients_by_loads_that_are_not_linear_are_those_of_differences(model):
+    """Rest curvatures of two loads add up, so each one's force depends on the other."""
+    wave = signals.sine(1.0, 2.0, 0.3)
+    loads = Rest(curvature=0.3), Rest(curvature=0.2, signal=wave), Damping(bending=0.1), Cubic()
+    problem, method = replace(uneven(6, model), loads=loads, duration=0.3), Gauss4(tolerance=1e-14)
+    names = {"loads[0].curvature": 0.3, "loads[1].curvature": 0.2, "loads[2].bending": 0.1, "loads[3].strength": 0.5}
+    found = gradient(problem, cost, (*names, "loads[1].signal.rate"), method, 0.05, [0.1, 0.3], progress=False, engine="plain")
+
+    def end(i, load):
+        given = replace(problem, loads=(*loads[:i], load, *loads[i + 1 :]))
+        return cost(simulate(given, method, 0.05, [0.1, 0.3], progress=False, engine="plain"))
+
+    for i, (name, value) in enumerate(names.items()):
+        up, down = (end(i, replace(loads[i], **{name.split(".")[1]: value + by})) for by in (1e-5, -1e-5))
+        assert found[name] == pytest.approx((up - down) / 2e-5, rel=1e-7, abs=1e-8), name
+    up, down = (end(1, replace(loads[1], signal=replace(wave, rate=2.0 + by))) for by in (1e-5, -1e-5))
+    assert found["loads[1].signal.rate"] == pytest.approx((up - down) / 2e-5, rel=1e-7, abs=1e-8)
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -165,8 +197,8 @@ def test_gradients_by_loads_and_signals_are_those_of_differences():
         ("loads[0].pattern", "'loads.0..pattern' is a function: give its values, as an array"),
         ("loads[0].about", "'loads.0..about' is no number and no array: 'roll'"),
         ("loads[1].signal.rate", "'loads.1..signal.rate': NoneType has the parameters none"),
-        ("loads[1].curvature", "'loads.1..curvature': its force is not linear in positions"),
-        ("loads[2].power", "derivatives are known for loads that are linear .*; not for Custom here"),
+        ("loads[2].power", "'loads.2..power' is no number and no array: None"),
+        ("loads[2].per_length", "'loads.2..per_length' is no number and no array: False"),
     ],
 )
 def test_parameters_of_loads_that_are_refused(name, words):
