@@ -9,12 +9,14 @@ A sweep takes what N and P do from the last one, finds mu, and corrects nu by th
 
 import numpy as np
 
-from discs.kernels.compiled import kernel, part
+from discs.integrators.collocation import combine
+from discs.kernels.compiled import kernel
 from discs.kernels.interrupts import interrupted
 from discs.kernels.linearised import (
     SWEEPS,
     across,
     added,
+    gather,
     linearise,
     prepare,
     remaining,
@@ -26,55 +28,7 @@ from discs.kernels.linearised import (
     turn_back,
     weigh,
 )
-from discs.kernels.shared import back as gather
 from discs.kernels.shared import copy, forward
-
-
-@part
-def guess(rule, h, value, late, later, ahead, to):
-    """A first guess of multipliers: h b w, and what else there was in the last step; with `ahead` = 1 as in the last two steps."""
-    for i in range(to.shape[0]):
-        for row in range(to.shape[1]):
-            weight, v, one, two, out = h * rule.b[i], value[row], late[i, row], later[i, row], to[i, row]
-            for k in range(out.size):
-                out[k] = weight * v[k] + one[k] + ahead * (one[k] - two[k])
-
-
-@part
-def total(a, b, to):
-    """to = a + b, (rows, n)."""
-    for row in range(to.shape[0]):
-        x, y, out = a[row], b[row], to[row]
-        for k in range(out.size):
-            out[k] = x[k] + y[k]
-
-
-@part
-def combined(rule, h, value, x, pulled, to):
-    """to_i = h b_i w + h sum_j a_ji (x_j - pulled_j)."""
-    for i in range(to.shape[0]):
-        for row in range(to.shape[1]):
-            weight, a, v, plus, less, out = h * rule.b[i], h * rule.a[0, i], value[row], x[0, row], pulled[0, row], to[i, row]
-            for k in range(out.size):
-                out[k] = weight * v[k] + a * (plus[k] - less[k])
-            for j in range(1, to.shape[0]):
-                a, plus, less = h * rule.a[j, i], x[j, row], pulled[j, row]
-                for k in range(out.size):
-                    out[k] += a * (plus[k] - less[k])
-
-
-@part
-def remainder(rule, h, value, y, nu, to):
-    """to_i = h b_i w + h sum_j a_ji y_j - nu_i."""
-    for i in range(to.shape[0]):
-        for row in range(to.shape[1]):
-            weight, a, v, plus, less, out = h * rule.b[i], h * rule.a[0, i], value[row], y[0, row], nu[i, row], to[i, row]
-            for k in range(out.size):
-                out[k] = weight * v[k] + a * plus[k] - less[k]
-            for j in range(1, to.shape[0]):
-                a, plus = h * rule.a[j, i], y[j, row]
-                for k in range(out.size):
-                    out[k] += a * plus[k]
 
 
 @kernel
@@ -92,12 +46,17 @@ def back(rule, chain, given, h, t, q, p, tolerance, seeds, place, value, sums, v
     columns = p.shape[2]
     at = stages(rule, chain, rows, columns)
     value_q, value_p = value[: rows * n].reshape(rows, n), value[rows * n :].reshape(columns, n)
-    mu, new, x, m = np.empty((s, rows, n)), np.empty((s, rows, n)), np.zeros((s, rows, n)), np.empty((s, rows, n))
-    nu, rest, change, y = np.empty((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n))
-    own, pulled, dragged = np.empty((s, rows, n)), np.empty((s, rows, n)), np.zeros((s, rows, n))
+    mu, new, x, m, own = (
+        np.zeros((s, rows, n)),
+        np.empty((s, rows, n)),
+        np.empty((s, rows, n)),
+        np.empty((s, rows, n)),
+        np.empty((s, rows, n)),
+    )
+    nu, rest, change, y = np.zeros((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n)), np.empty((s, columns, n))
+    pulled, force, dragged, damped = np.empty((s, rows, n)), np.empty((rows, n)), np.zeros((s, rows, n)), given.drag.data.size > 0
     late_q, later_q = np.zeros((s, rows, n)), np.zeros((s, rows, n))
     late_p, later_p = np.zeros((s, columns, n)), np.zeros((s, columns, n))
-    damped = given.drag.data.size > 0
     for k in range(steps - 1, -1, -1):
         if interrupted(20 * s * value.size):
             return -1
@@ -107,8 +66,15 @@ def back(rule, chain, given, h, t, q, p, tolerance, seeds, place, value, sums, v
         linearise(rule, chain, given, at, q[k], p[k], k * s)
         prepare(rule, chain, at, h, t + k * h, q[k], p[k])
         ahead = 1.0 if steps - 1 - k > 1 else 0.0
-        guess(rule, h, value_q, late_q, later_q, ahead, mu)
-        guess(rule, h, value_p, late_p, later_p, ahead, nu)
+        for i in range(s):  # a first guess: what the stages add to h b w, as in the last steps
+            for row in range(rows):
+                for disc in range(n):
+                    guess = (1.0 + ahead) * late_q[i, row, disc] - ahead * later_q[i, row, disc]
+                    mu[i, row, disc] = h * rule.b[i] * value_q[row, disc] + guess
+            for row in range(columns):
+                for disc in range(n):
+                    guess = (1.0 + ahead) * late_p[i, row, disc] - ahead * later_p[i, row, disc]
+                    nu[i, row, disc] = h * rule.b[i] * value_p[row, disc] + guess
         for j in range(s):
             forward(at.c[j], nu[j], own[j])
             stiffened(chain, given, at, j, own[j], pulled[j])
@@ -118,30 +84,50 @@ def back(rule, chain, given, h, t, q, p, tolerance, seeds, place, value, sums, v
                 if damped:
                     dragged[j] = 0.0
                     across(given.drag, own[j], -1.0, dragged[j])
-                    total(mu[j], dragged[j], m[j])
-                x[j] = 0.0
-                turn_back(chain, at, j, m[j] if damped else mu[j], nu[j], x[j])
-            combined(rule, h, value_q, x, pulled, new)
+                for row in range(rows):
+                    for i in range(n):
+                        m[j, row, i] = mu[j, row, i] + dragged[j, row, i]
+                        x[j, row, i] = -pulled[j, row, i]
+                turn_back(chain, at, j, m[j], nu[j], x[j])
+            for i in range(s):
+                combine(rule.a[:, i], x, h, new[i])
+                shifted(value_q, h * rule.b[i], new[i])
             for j in range(s):
+                copy(new[j], m[j])
                 if damped:
-                    total(new[j], dragged[j], m[j])
-                gather(at.c[j], m[j] if damped else new[j], y[j])
-            remainder(rule, h, value_p, y, nu, rest)
+                    shifted(dragged[j], 1.0, m[j])
+                gather(at.c[j], m[j], y[j])
+            for i in range(s):
+                combine(rule.a[:, i], y, h, rest[i])
+                shifted(value_p, h * rule.b[i], rest[i])
+                shifted(nu[i], -1.0, rest[i])
             solve(rule, chain, True, at, rest, change)
             last, off = off, added(change, nu)
             for j in range(s):  # what that does to mu
                 forward(at.c[j], nu[j], own[j])
-                stiffened(chain, given, at, j, own[j], pulled[j])
-            combined(rule, h, value_q, x, pulled, new)
+                stiffened(chain, given, at, j, own[j], force)
+                for row in range(rows):
+                    for i in range(n):
+                        x[j, row, i] += pulled[j, row, i] - force[row, i]
+                        pulled[j, row, i] = force[row, i]
+            for i in range(s):
+                combine(rule.a[:, i], x, h, new[i])
+                shifted(value_q, h * rule.b[i], new[i])
             off = max(off, replaced(new, mu))
             left = remaining(last, off)
             sweep += 1
-        if not (left <= tolerance and np.isfinite(nu.sum())):
+        total = 0.0
+        for i in range(s):
+            for row in range(columns):
+                for disc in range(n):
+                    total += nu[i, row, disc]
+        if not (left <= tolerance and np.isfinite(total)):
             return steps - 1 - k
         for j in range(s):
             if sums.size > 0:
                 copy(mu[j], m[j])
-                across(given.drag, own[j], -1.0, m[j])
+                if damped:
+                    across(given.drag, own[j], -1.0, m[j])
                 weigh(chain, at, j, m[j], nu[j], p[k, j], sums)
             if w.size > 0:
                 copy(own[j], w[k, j])

@@ -187,6 +187,17 @@ def stiffened(chain, given, at, j, w, to):
 
 
 @part
+def gather(c, m, to):
+    """to = C^T m."""
+    for row in range(to.shape[0]):
+        to[row] = 0.0
+    for row in range(c.shape[0]):
+        a, b, total = c[row], m[row], to[column(row)]
+        for i in range(a.size):
+            total[i] += a[i] * b[i]
+
+
+@part
 def remaining(last, off):
     """The error that is left after a sweep which changed by `off`, the one before by `last`: they fall like a geometric series."""
     return off * off / (last - off) if off < last < np.inf else off

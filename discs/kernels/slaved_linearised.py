@@ -65,9 +65,7 @@ def _turn_back(chain, at, j, m, nu, to):
     for h in range(2):
         (bx, by, bt), pull, tension, x = at.turned[j, h], at.pull[j, h, 0], at.flat.tension[h], to[h]
         for i in range(n):
-            along[i] = bx[i] * m[0, i] + by[i] * m[1, i]
-        for i in range(n):
-            along[i] = half * (along[i] + bt[i] * m[2, i] - pull[i] * nu[0, i])
+            along[i] = half * (bx[i] * m[0, i] + by[i] * m[1, i] + bt[i] * m[2, i] - pull[i] * nu[0, i])
         tension[0], tension[n] = along[0], along[n - 1]
         for i in range(1, n):
             tension[i] = along[i - 1] + along[i]
@@ -102,19 +100,10 @@ def release(ends, to):
 
 @fill(linearised.weigh, Slaved)
 def _weigh(chain, at, j, m, nu, p, sums):
-    (cx, cy, ct), (ax, ay), mass, whole = at.c[j], at.arm[j], chain.weights[0], at.along
-    whole[:] = 0.0
-    for row in range(3):
-        c, g, mu = at.c[j, row], at.g[j, row], m[row]
-        for i in range(whole.size):
-            whole[i] += c[i] * (mu[i] * p[0, i] - nu[0, i] * g[i])
-    for i in range(whole.size):
-        sums[0, i] -= 0.5 * (cx[i] * cx[i] + cy[i] * cy[i]) * whole[i]
-    for i in range(whole.size):
-        sums[1, i] -= 0.5 * ct[i] * ct[i] * whole[i]
-    for row in range(2):
-        arm, g, mu = at.arm[j, row], at.g[j, row], m[row]
-        for i in range(whole.size):
-            sums[2, i] += ct[i] * arm[i] * (mu[i] * p[0, i] - nu[0, i] * g[i])
-    for i in range(whole.size):
-        sums[2, i] -= mass[i] * (cx[i] * ax[i] + cy[i] * ay[i]) * ct[i] * whole[i]
+    (cx, cy, ct), (gx, gy, gt), (ax, ay), mass = at.c[j], at.g[j], at.arm[j], chain.weights[0]
+    for i in range(ct.size):
+        x, y, t = m[0, i] * p[0, i] - nu[0, i] * gx[i], m[1, i] * p[0, i] - nu[0, i] * gy[i], m[2, i] * p[0, i] - nu[0, i] * gt[i]
+        whole, across = cx[i] * x + cy[i] * y + ct[i] * t, cx[i] * ax[i] + cy[i] * ay[i]
+        sums[0, i] -= 0.5 * (cx[i] * cx[i] + cy[i] * cy[i]) * whole
+        sums[1, i] -= 0.5 * ct[i] * ct[i] * whole
+        sums[2, i] += ct[i] * (ax[i] * x + ay[i] * y - mass[i] * across * whole)

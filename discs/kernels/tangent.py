@@ -14,6 +14,7 @@ from discs.kernels.compiled import kernel
 from discs.kernels.linearised import (
     SWEEPS,
     added,
+    gather,
     linearise,
     prepare,
     remaining,
@@ -25,7 +26,6 @@ from discs.kernels.linearised import (
     times,
     turn,
 )
-from discs.kernels.shared import back as gather
 from discs.kernels.shared import copy, forward
 
 
