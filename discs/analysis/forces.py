@@ -9,7 +9,7 @@ For all other loads the whole force is taken by differences of order 4, at each 
 import re
 from abc import ABC, abstractmethod
 from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class LoadParameter(ABC):
     def __init__(self, problem: Problem, name: str, place: int, owner: Any, attribute: str, value: Float) -> None:
         self.name, self.value = name, value
         self._problem, self._place, self._owner, self._attribute = problem, place, owner, attribute
-        self._load, self._bound = problem.loads[place], problem.bound[place]
+        self._load, self._bound = problem.loads[place], cast(Any, problem.bound[place])
         self._of_signal = owner is not self._load
 
     @abstractmethod
@@ -118,7 +118,7 @@ class AnyParameter(LoadParameter):
         """All loads together, with one entry of the parameter changed."""
         if (place, by) not in self._loads:
             owner, loads = self._changed(place, by), list(self._problem.loads)
-            loads[self._place] = replace(self._load, signal=owner) if self._of_signal else owner  # type: ignore[call-arg, type-var]
+            loads[self._place] = replace(self._load, signal=owner) if self._of_signal else owner  # type: ignore[type-var]
             self._loads[place, by] = replace(self._problem, loads=tuple(loads)).system.load
         return self._loads[place, by]
 

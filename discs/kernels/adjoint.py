@@ -19,7 +19,6 @@ from discs.kernels.linearised import (
     gather,
     linearise,
     prepare,
-    remaining,
     replaced,
     shifted,
     solve,
@@ -78,8 +77,8 @@ def back(rule, chain, given, h, t, q, p, tolerance, seeds, place, value, sums, v
         for j in range(s):
             forward(at.c[j], nu[j], own[j])
             stiffened(chain, given, at, j, own[j], pulled[j])
-        sweep, off, left = 0, np.inf, np.inf
-        while sweep < SWEEPS and left > tolerance:
+        sweep, off = 0, np.inf
+        while sweep < SWEEPS and off > tolerance:
             for j in range(s):
                 if damped:
                     dragged[j] = 0.0
@@ -102,7 +101,7 @@ def back(rule, chain, given, h, t, q, p, tolerance, seeds, place, value, sums, v
                 shifted(value_p, h * rule.b[i], rest[i])
                 shifted(nu[i], -1.0, rest[i])
             solve(rule, chain, True, at, rest, change)
-            last, off = off, added(change, nu)
+            off = added(change, nu)
             for j in range(s):  # what that does to mu
                 forward(at.c[j], nu[j], own[j])
                 stiffened(chain, given, at, j, own[j], force)
@@ -114,14 +113,13 @@ def back(rule, chain, given, h, t, q, p, tolerance, seeds, place, value, sums, v
                 combine(rule.a[:, i], x, h, new[i])
                 shifted(value_q, h * rule.b[i], new[i])
             off = max(off, replaced(new, mu))
-            left = remaining(last, off)
             sweep += 1
         total = 0.0
         for i in range(s):
             for row in range(columns):
                 for disc in range(n):
                     total += nu[i, row, disc]
-        if not (left <= tolerance and np.isfinite(total)):
+        if not (off <= tolerance and np.isfinite(total)):
             return steps - 1 - k
         for j in range(s):
             if sums.size > 0:

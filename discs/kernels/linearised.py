@@ -198,12 +198,6 @@ def gather(c, m, to):
 
 
 @part
-def remaining(last, off):
-    """The error that is left after a sweep which changed by `off`, the one before by `last`: they fall like a geometric series."""
-    return off * off / (last - off) if off < last < np.inf else off
-
-
-@part
 def shifted(values, factor, to):
     """to += factor values."""
     for row in range(to.shape[0]):

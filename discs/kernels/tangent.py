@@ -17,7 +17,6 @@ from discs.kernels.linearised import (
     gather,
     linearise,
     prepare,
-    remaining,
     replaced,
     shifted,
     solve,
@@ -50,8 +49,8 @@ def tangent(rule, chain, given, h, t, q, p, tolerance, dy):
             copy(start_p, dpi[j])
             moved[j], pulled[j] = 0.0, 0.0
             turn(chain, at, j, dq[j], moved[j], pulled[j])
-        sweep, off, left = 0, np.inf, np.inf
-        while sweep < SWEEPS and left > tolerance:
+        sweep, off = 0, np.inf
+        while sweep < SWEEPS and off > tolerance:
             for j in range(s):
                 forward(at.c[j], dpi[j], v[j])
                 shifted(moved[j], 1.0, v[j])
@@ -72,7 +71,7 @@ def tangent(rule, chain, given, h, t, q, p, tolerance, dy):
                 shifted(start_p, 1.0, rest[i])
                 shifted(dpi[i], -1.0, rest[i])
             solve(rule, chain, False, at, rest, change)
-            last, off = off, added(change, dpi)
+            off = added(change, dpi)
             for j in range(s):  # what that does to dq
                 forward(at.c[j], change[j], v[j])
             for i in range(s):
@@ -82,9 +81,8 @@ def tangent(rule, chain, given, h, t, q, p, tolerance, dy):
                 moved[j], pulled[j] = 0.0, 0.0
                 turn(chain, at, j, new[j], moved[j], pulled[j])
             off = max(off, replaced(new, dq))
-            left = remaining(last, off)
             sweep += 1
-        if not (left <= tolerance and np.isfinite(dpi.sum())):
+        if not (off <= tolerance and np.isfinite(dpi.sum())):
             return False
         share = 1.0 - rule.last.sum()
         for row in range(rows):
