@@ -5,6 +5,8 @@ docs/images` makes those of the field.
 """
 
 import shutil
+import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -49,6 +51,34 @@ def shot(page: Path, to: Path, t: float) -> None:
         browser.save_screenshot(str(to))
     finally:
         browser.quit()
+
+
+def lab_shot(to: Path, t: float) -> None:
+    """A picture of the lab when its discs have moved until a time."""
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    flags = "--headless=new --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --window-size=1280,940"
+    for flag in flags.split():
+        options.add_argument(flag)
+    command = [sys.executable, "-m", "compare", "lab", "--no-browser", "--stay"]
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=shutil.which("chromedriver")))
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as served:
+        try:
+            browser.set_script_timeout(300)
+            browser.get(served.stdout.readline().split()[-1])
+            there = f"globalThis.discs?.frame?.t > {t} && discs.frame.error"
+            look = f"const done = arguments[0], look = () => {there} ? done() : setTimeout(look, 20); look()"
+            browser.execute_async_script(look)
+            browser.execute_script("document.querySelector('.play').click()")
+            time.sleep(2)
+            browser.execute_script("discs.stage.renderer.setPixelRatio(1); discs.stage.resize()")
+            time.sleep(1)
+            browser.save_screenshot(str(to))
+        finally:
+            browser.quit()
+            served.send_signal(signal.SIGINT)
 
 
 def loads() -> Figure:
@@ -214,12 +244,13 @@ def main() -> None:
     small_motions().savefig(IMAGES / "modes.png", dpi=100)
     ground_force().savefig(IMAGES / "ground-force.png", dpi=100)
     if not shutil.which("chromedriver"):
-        sys.exit("no chromedriver: view.png is not made")
+        sys.exit("no chromedriver: view.png and lab.png are not made")
     few = simulate(lump(scene, n=17), dt=0.02, frames=91)
     field = solve(scene, tol=1e-3, frames=91)
     with tempfile.TemporaryDirectory() as folder:
         page = few.view(Path(folder) / "both.html", beside=field, titles=("17 discs, plain springs", "the rod they become"))
         shot(page.path, IMAGES / "view.png", 3.0)
+    lab_shot(IMAGES / "lab.png", 2.5)
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ def test_elsewhere_the_mouse_turns_the_view(page):
     where = "discs.stage.camera.position.toArray()"
     first = np.array(ask(page, where))
     stage = page.find_element("css selector", ".stage")
-    corner = hand(page).move_to_element_with_offset(stage, 20 - int(stage.rect["width"] / 2), int(stage.rect["height"] / 2) - 20)
+    corner = hand(page).move_to_element_with_offset(stage, 20 - int(stage.rect["width"] / 2), 60 - int(stage.rect["height"] / 2))
     corner.click_and_hold().move_by_offset(80, -10).release().perform()
     assert abs(np.array(ask(page, where)) - first).max() > 0.1
     assert ask(page, "discs.frame.pulled") is None

@@ -141,10 +141,7 @@ function render({ model, el, whole = false }) {
   }
 
   function settle() { // the panels for a first frame: where the discs are and will roll
-    const n = frame.n, length = scene.length;
-    const points = Array.from({ length: n }, (_, i) => [frame.rows.x[i], frame.rows.y[i]]);
-    const mid = [0, 1].map((k) => points.reduce((sum, p) => sum + p[k], 0) / n);
-    stage.show([...points, [mid[0], mid[1] - 0.2 * length], [mid[0], mid[1] + 0.2 * length]]);
+    const n = frame.n, mid = fit();
     for (const each of panels) stage.drop(each);
     panels = [0, 1].map(() => stage.build(n, Number(scene.ring), new Float32Array(6 * n * TRAIL)));
     arrows = stage.rods(panels[0].scene, 2 * n + 1, 0.5);
@@ -154,6 +151,13 @@ function render({ model, el, whole = false }) {
     arrows.material.color.set(tone("push"));
     resize();
     stage.home();
+  }
+
+  function fit() { // what the view shows when it is reset; the middle of the discs
+    const n = frame.n, points = Array.from({ length: n }, (_, i) => [frame.rows.x[i], frame.rows.y[i]]);
+    const mid = [0, 1].map((k) => points.reduce((sum, p) => sum + p[k], 0) / n);
+    stage.show([...points, [mid[0], mid[1] - 0.2 * scene.length], [mid[0], mid[1] + 0.2 * scene.length]]);
+    return mid;
   }
 
   function clear() { // the plots and the trails
@@ -174,7 +178,7 @@ function render({ model, el, whole = false }) {
     if (!stage) return;
     if (first) settle();
     const count = content.error ? 2 : 1;
-    if (stage.count !== count) { stage.count = count; resize(); }
+    if (stage.count !== count && pulling === null) { stage.count = count; fit(); resize(); }
     if (jumped) trail = { head: 0, filled: 0, before: null };
     remember();
     follow();
@@ -229,7 +233,7 @@ function render({ model, el, whole = false }) {
   function draw() {
     const R = scene.radius, n = frame.n;
     stage.pose(panels[0], { x: row("x"), y: row("y"), axle: row("axle"), theta: row("theta"), tint: tinted("") });
-    if (stage.count === 2) stage.pose(panels[1], { x: row("field_x"), y: row("field_y"), axle: row("field_axle"), theta: row("field_theta"), tint: tinted("field_") });
+    if (frame.error) stage.pose(panels[1], { x: row("field_x"), y: row("field_y"), axle: row("field_axle"), theta: row("field_theta"), tint: tinted("field_") });
     const { x, y, force_x: fx, force_y: fy } = frame.rows;
     let largest = 0;
     for (let i = 0; i < n; i++) largest = Math.max(largest, Math.hypot(fx[i], fy[i]));
@@ -337,7 +341,7 @@ function render({ model, el, whole = false }) {
   step.onclick = () => pace("forward");
   reset.onclick = again;
   rewind.oninput = () => { pause(true); latest.set("seek", { kind: "seek", time: Number(rewind.value) }); };
-  view.onclick = () => { if (frame) { settle(); } };
+  view.onclick = () => { if (frame && panels.length) { fit(); stage.home(); } };
   colour.onchange = forces.onchange = () => { if (stage) stage.stale = true; };
   compare.onchange = () => ask({ kind: "compare", on: compare.checked });
   for (const [name, control] of Object.entries(chosen)) {
