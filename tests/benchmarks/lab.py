@@ -10,7 +10,6 @@ import json
 import os
 import re
 import shutil
-import signal
 import statistics
 import subprocess
 import sys
@@ -159,7 +158,7 @@ def main() -> None:
             if shutil.which("chromium"):
                 in_browser(found[0])
         finally:
-            process.send_signal(signal.SIGINT)
+            process.terminate()  # not Ctrl-C, which background jobs ignore
             process.wait()
 
 
