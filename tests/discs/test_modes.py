@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from continuum import Rod, SteeredRod
@@ -109,6 +110,40 @@ def test_free_rods_tend_to_the_field_at_order_2(ends):
         assert found.symmetries == ("x", "y", "roll", "turn")
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert (np.abs(orders - 2) < 0.12).all(), orders
+
+
+def own_frequencies(count):
+    """Of the straight rod with own headings at rest, with u = (theta, T = beta theta' + R n, phi, m = K phi'), n = G (R theta' - phi).
+
+    M theta'' = T', J phi'' = m' + n in time and s; T and m are zero at the ends (docs/model.md).
+    """
+    m, (beta, bend, radius) = 1.3 * 0.64 + 0.9, (0.8, 0.7, 0.8)
+    g, inertia = BEAMS["shear_stiffness"], BEAMS["heading_inertia"]
+    both = beta + g * radius**2
+
+    def off(w):
+        n = np.array([0.0, g * radius / both, g * radius**2 * g / both - g, 0.0])
+        a = np.array(
+            [[0, 1 / both, radius * g / both, 0], [-m * w * w, 0, 0, 0], [0, 0, 0, 1 / bend], [0, 0, -inertia * w * w, 0] - n]
+        )
+        return float(np.linalg.det(expm(4.0 * a)[1::2, ::2]))
+
+    grid = np.linspace(0.05, 3.0, 400)
+    values = [off(w) for w in grid]
+    return [brentq(off, a, b, xtol=1e-13) for a, b, u, v in zip(grid, grid[1:], values, values[1:], strict=False) if u * v < 0][
+        :count
+    ]
+
+
+@pytest.mark.parametrize(("degree", "order"), [(1, 2), (2, 4)])
+def test_free_rods_with_own_headings_tend_to_the_field(degree, order):
+    right, errors = np.array(own_frequencies(4)), []
+    for n in (17, 33, 65):
+        chain = SteeredChain(n=n, degree=degree, **ROD, **BEAMS)
+        found = modes(Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s, phi=0 * chain.s), 1.0), count=8)
+        errors.append(np.abs(np.abs(found.rate[::2]) - right) / right)
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert (np.abs(orders[-1] - order) < 0.25).all(), orders
 
 
 @pytest.mark.parametrize(("degree", "order"), [longer(1, 2), (2, 4)])
