@@ -113,7 +113,7 @@ def test_free_rods_tend_to_the_field_at_order_2(ends):
 
 
 def own_frequencies(count):
-    """Of the straight rod with own headings at rest, with u = (theta, T = beta theta' + R n, phi, m = K phi'), n = G (R theta' - phi).
+    """Of the straight rod with own headings at rest: u = (theta, T = beta theta' + R n, phi, m = K phi'), n = G (R theta' - phi).
 
     M theta'' = T', J phi'' = m' + n in time and s; T and m are zero at the ends (docs/model.md).
     """
