@@ -19,6 +19,7 @@ from discs.linkage import LinkageProblem
 from discs.linkage.motion import run as linkage_run
 from discs.problem import Problem
 from discs.running.album import Album
+from discs.running.by_dop853 import pays
 from discs.running.doubt import doubted
 from discs.running.engine import WAITING, Overtaken, plain_because, refuse_loads
 from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
@@ -30,7 +31,7 @@ from discs.running.stats import Stats, begun, of_search
 from discs.running.step_error import Watch
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
-from discs.running.tolerance import answered, search_with_doubt, some_of
+from discs.running.tolerance import USUAL, answered, search_with_doubt, some_of
 from discs.solution import Solution
 from discs.warn import warn
 
@@ -142,7 +143,8 @@ def _search(
         integrator, dt, searched = kept
         return _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched), ""
     looked_at = times if checkpoint is None else some_of(times)
-    found, doubt = answered(search_with_doubt(problem, method, tol, looked_at, want), run)
+    explicit = method == "auto" and checkpoint is None and not events and not want and _explicit(problem, tol, engine, not progress)
+    found, doubt = answered(search_with_doubt(problem, method, tol, looked_at, want, explicit=explicit), run)
     if checkpoint is not None or events:
         integrator, dt = from_settings(found.stats["settings"]), found.stats["dt"]
         searched, known = of_search(found.stats), found.error_estimate
@@ -150,6 +152,15 @@ def _search(
             return _eventful(problem, integrator, dt, times, want, progress, engine, checkpoint, events, searched, known), doubt
         found = _run(problem, integrator, dt, times, want, progress, engine, checkpoint, False, searched, known)
     return found, doubt
+
+
+def _explicit(problem: Problem, tol: float | Mapping[str, float] | None, engine: str, quiet: bool) -> bool:
+    """Whether "auto" may try DOP853: for few discs without loads, if its kernel is there."""
+    given = [USUAL] if tol is None else list(tol.values()) if isinstance(tol, Mapping) else [tol]
+    least = min((value for value in given if isinstance(value, int | float) and value > 0), default=USUAL)  # checked later
+    if engine == "plain" or problem.system.load is not None or problem.system.parameters is None or not pays(problem, least):
+        return False
+    return bool(kernels(engine, problem, find("DOP853"), problem.duration, False, quiet))
 
 
 def _eventful(

@@ -17,7 +17,8 @@ from discs import Problem, SimulationError, Solution, simulate, suggest_dt
 from discs.arrays import Float
 from discs.integrators import Integrator
 from discs.running.doubt import ENERGY_DRIFT_WARNING
-from discs.running.tolerance import USUAL, NotReached, to_tolerance
+from discs.running.failure import NotReached
+from discs.running.tolerance import USUAL, to_tolerance
 
 CONSERVING, GAUSS = ("midpoint", "suzuki4", "kahanli6"), ("gauss4", "gauss6", "gauss8")
 EXPLICIT = ("leapfrog", "mclachlan-perlmutter", "rk4")

@@ -74,9 +74,18 @@ def errors(
     for name, off in differences(run, finer, names).items():
         part = 1 - ratio ** -min(order.get(name, 1.0), MOST_ORDER)
         found[name] = SAFETY * off / part + more.get(name, 0.0)
-    if run.problem.conserves and names is None:
-        found["energy"] = float(np.abs(run.energy - run.problem.energy()).max())
-    return found
+    return with_energy(found, run) if names is None else found
+
+
+def with_energy(found: dict[str, float], run: Solution) -> dict[str, float]:
+    """The errors, with the drift of a conserved energy as its error."""
+    assert run.problem is not None
+    return found | {"energy": float(np.abs(run.energy - run.problem.energy()).max())} if run.problem.conserves else found
+
+
+def worst(errors: Mapping[str, float], bound: Mapping[str, float], size: Mapping[str, float]) -> float:
+    """The largest error in units of its tolerance; quantities without one count as exact."""
+    return max(errors.get(name, 0.0) / (tol * size[name]) for name, tol in bound.items())
 
 
 def unswept(run: Solution, tolerance: float) -> dict[str, float]:

@@ -19,7 +19,10 @@ Input: a problem, tolerances and frames. Output: a run within the tolerances, wi
    place. If they differ by a tenth of the error or more, or if sweeps that converged to rounding may leave as much, rounding is
    the limit, and `NotReached` is raised. For tolerances below FINE, or after LATE runs, this test is made as soon as errors are
    below RESOLVED; if the difference exceeds the tolerance, no step can reach it.
-6. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
+6. If LONG steps or more leave an error of LARGE, the motion may be one whose small changes grow: its horizon is looked for
+   (`discs.running.horizon`), with the method of the highest order, and again after AGAIN times as many steps. If it is before the
+   end, `NotReached` says from which time on the tolerance cannot be held.
+7. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
    ends there, provided that its |r'| one step before is below ENDED and that two runs in a row lose it at the same time.
 
 The tolerance of sweeps is such that all steps together leave an error of SWEPT times the tolerance
@@ -39,8 +42,10 @@ from discs.arrays import Float
 from discs.integrators import Gauss6, Gauss8, Integrator, Midpoint, find
 from discs.problem import Problem
 from discs.running import estimates
+from discs.running.by_dop853 import search_explicit
 from discs.running.estimates import LEAST_ORDER
-from discs.running.failure import SimulationError
+from discs.running.failure import NotReached, SimulationError
+from discs.running.horizon import horizon
 from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
 from discs.solution import Solution
@@ -56,6 +61,8 @@ AIM = 1.3  # the next run aims at the tolerance over this
 RESOLVED = 1e-2  # relative error below which the effect of rounding is tested
 FINE = 1e-9  # tolerance below which the effect of rounding is tested early
 LATE = 8  # runs after which it is tested in any case
+LONG, AGAIN, LONGER = 4000, 8, 4.0  # step 6: steps from which on the horizon is looked for, and again; steps there, in units of dt
+LARGE = 0.3  # relative error for that
 SLOWEST = 2.0  # least order by which the number of steps is chosen: a smaller one is that of waves that are not resolved yet
 ENDED = 0.01  # |r'| of a disc one step before it loses its heading; if it is larger, the step is too long
 ATTEMPTS, FAILURES = 28, 16  # runs at most, and failures among them
@@ -120,11 +127,12 @@ def search_with_doubt(
     times: Float,
     want: Iterable[str] = (),
     coarse: bool = False,
+    explicit: bool = False,
 ) -> Search[tuple[Solution, str]]:
     """As `search`, and a warning or "". With "auto" and without a tolerance the last run is the result even if `USUAL` was not
     reached, with a warning."""
     try:
-        return (yield from search(problem, method, USUAL if tol is None else tol, times, want, coarse)), ""
+        return (yield from search(problem, method, USUAL if tol is None else tol, times, want, coarse, explicit)), ""
     except NotReached as error:
         if tol is not None or method != "auto":
             raise
@@ -138,6 +146,7 @@ def search(
     times: Float,
     want: Iterable[str] = (),
     coarse: bool = False,
+    explicit: bool = False,
 ) -> Search[Solution]:
     """Run with shorter and shorter steps until the estimated error is within the tolerance; the algorithm is above.
 
@@ -149,6 +158,7 @@ def search(
     times : frames, (F,).
     want : further quantities to record.
     coarse : choose steps and tolerances of sweeps from a few, the next ones that are not larger.
+    explicit : "auto" may try "DOP853" first.
 
     Returns
     -------
@@ -163,23 +173,28 @@ def search(
     SimulationError : if the motion ends before the last frame, or if runs fail with every step.
     """
     bound = checks.tolerances(tol, names(problem, want), problem.system.rows, LEAST)
-    integrator, *higher = methods_for(method, min(bound.values()), len(problem.system.rows))
+    least_tol = min(bound.values())
+    integrator, *higher = methods_for(method, least_tol, len(problem.system.rows))
     if not times[-1]:
         start = yield problem, integrator, problem.duration / FEWEST, times
         return _told(start, dict.fromkeys(estimates.compared(start), 0.0), tol, 1, "fewest steps")
-    end, some = float(times[-1]), some_of(times)
+    end, some, made = float(times[-1]), some_of(times), 0
+    if method == "auto" and explicit and some.size == times.size:
+        fitting, known, made = yield from search_explicit(problem, bound, times)
+        if fitting is not None:
+            return _told(fitting, known, tol, made, "fewest steps" if made == 2 else "tolerance")
     steps = _fewest(problem, integrator, end)
     runs: list[Solution] = []  # of one method, at most three, with shorter and shorter steps
     sweeps: dict[float, Integrator] = {}  # the method with its tolerance of sweeps, by the step of a run
     size: dict[str, float] = {}
     failure: SimulationError | None = None
-    looked, stalls, failures, best_yet = False, 0, 0, np.inf
+    looked, stalls, failures, best_yet, long = False, 0, 0, np.inf, LONG
 
     def told(longer: Solution, shorter: Solution, limit: str) -> Solution:
         """The run with longer steps, with estimates of all its errors."""
         order = estimates.orders(runs[0], runs[1], runs[2], integrator.order) if len(runs) == 3 else {}
         errors = estimates.errors(longer, shorter, order, sweeps[longer.stats["dt"]].sweep_tolerance)
-        return _told(longer, errors, tol, attempt, limit)
+        return _told(longer, errors, tol, made + attempt, limit)
 
     for attempt in range(1, ATTEMPTS + 1):
         dt = end / steps
@@ -208,29 +223,35 @@ def search(
         order = {} if first else estimates.orders(runs[0], runs[1], runs[2], integrator.order, bound)
         swept = sweeps[longer.stats["dt"]].sweep_tolerance
         errors = estimates.errors(longer, shorter, order, swept, bound)
-        worst = _worst(errors, bound, size)
+        worst = estimates.worst(errors, bound, size)
         if worst <= 1 and some.size < times.size:
             longer = yield problem, sweeps[longer.stats["dt"]], longer.stats["dt"], times
             shorter = yield problem, sweeps[shorter.stats["dt"]], shorter.stats["dt"], times
             errors = estimates.errors(longer, shorter, order, swept, bound)
-            worst = _worst(errors, bound, estimates.sizes(shorter, bound))
-        left = _worst(estimates.unswept(longer, swept), bound, size)
+            worst = estimates.worst(errors, bound, estimates.sizes(shorter, bound))
+        left = estimates.worst(estimates.unswept(longer, swept), bound, size)
         limit = "fewest steps" if first else "sweeps" if left > worst / 2 else "tolerance"
         if worst <= 1:
             return told(longer, shorter, limit)
         seen = 1.0 if first else order[max(bound, key=lambda name: errors[name] / bound[name] / size[name])]
         stalls = stalls + 1 if not first and (seen <= LEAST_ORDER or worst >= best_yet) else 0
         best_yet = min(best_yet, worst)
-        due = not looked and (attempt >= LATE or min(bound.values()) < FINE)
-        resolved = due and max(errors[name] / size[name] for name in bound) < RESOLVED
+        due = not looked and (attempt >= LATE or least_tol < FINE)
+        relative = max(errors[name] / size[name] for name in bound)
+        if relative > LARGE and shorter.stats["steps"] >= long:
+            long = AGAIN * shorter.stats["steps"]
+            until = yield from horizon(problem, higher[-1] if higher else integrator, LONGER * shorter.stats["dt"], end, bound)
+            if until < end:
+                raise NotReached(least_tol, worst, longer.stats["dt"], None, told(longer, shorter, limit), attempt, until)
+        resolved = due and relative < RESOLVED
         if resolved or (stalls and not higher):
             looked = True
             other = yield estimates.nudged(problem), sharp, dt, found.t
-            floor = _worst(estimates.differences(found, other), bound, size)
+            floor = estimates.worst(estimates.differences(found, other), bound, size)
             if sharp.sweep_tolerance <= estimates.LEAST_SWEPT:  # sweeps that converged to rounding
-                floor = max(floor, _worst(estimates.unswept(found, sharp.sweep_tolerance), bound, size))
+                floor = max(floor, estimates.worst(estimates.unswept(found, sharp.sweep_tolerance), bound, size))
             if floor > (1 if resolved else worst / 10):
-                raise NotReached(min(bound.values()), worst, longer.stats["dt"], floor, told(longer, shorter, limit))
+                raise NotReached(least_tol, worst, longer.stats["dt"], floor, told(longer, shorter, limit), attempt)
         if stalls >= 2 and higher:
             integrator, *higher = higher
             steps, runs, stalls, best_yet = max(FEWEST, steps // 4), [], 0, np.inf
@@ -242,34 +263,12 @@ def search(
         steps = int(np.ceil(2.0 ** (np.ceil(COARSE * np.log2(wanted)) / COARSE) if coarse else wanted))
     if len(runs) < 2:
         raise failure or SimulationError(f"steps do not converge, down to dt = {dt:g}; take another method", 0, 0.0, 0)
-    raise NotReached(min(bound.values()), worst, longer.stats["dt"], None, told(longer, shorter, limit))
+    raise NotReached(least_tol, worst, longer.stats["dt"], None, told(longer, shorter, limit), ATTEMPTS)
 
 
 def some_of(times: Float) -> Float:
     """The times at which the search compares runs, at most PROBES."""
     return times if times.size <= PROBES else times[np.linspace(0, times.size - 1, PROBES).round().astype(int)]
-
-
-class NotReached(SimulationError):
-    """A tolerance that was not reached.
-
-    Attributes
-    ----------
-    best : the last run with an estimate of its error.
-    """
-
-    def __init__(self, tol: float, worst: float, dt: float, floor: float | None, best: Solution) -> None:
-        what = f"tol = {tol:g} was not reached: the error is estimated at {tol * worst:.1e} with dt = {dt:g}"
-        if floor is None:
-            why = f"and {ATTEMPTS} runs with smaller and smaller steps were made; take a larger tol or another method"
-        else:
-            why = f"and rounding of positions and sweeps changes a run by {tol * floor:.1e}, so rounding is the limit; "
-            why += "take a larger tol, or end the run earlier"
-        super().__init__(f"{what}, {why}", best.stats["steps"], best.t[-1], 0)
-        self.best, self._given = best, (tol, worst, dt, floor, best)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return type(self), self._given
 
 
 def _sharpened(integrator: Integrator, free: bool, tolerance: float) -> Integrator:
@@ -280,11 +279,6 @@ def _sharpened(integrator: Integrator, free: bool, tolerance: float) -> Integrat
 def _usual(order: int) -> float:
     """The order that the first runs usually show, while some waves are not resolved."""
     return min(order, 2 + order / 3)
-
-
-def _worst(errors: Mapping[str, float], bound: Mapping[str, float], size: Mapping[str, float]) -> float:
-    """The largest error in units of its tolerance; quantities without one count as exact."""
-    return max(errors.get(name, 0.0) / (tol * size[name]) for name, tol in bound.items())
 
 
 def _told(run: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int, limit: str) -> Solution:

@@ -10,7 +10,7 @@ from compare.__main__ import main
 from compare.random_runs import SIZES, Runs, examine, random_problem
 from compare.trust_table import LEAST, MOST, Row
 from discs import SimulationError, simulate
-from discs.running.tolerance import NotReached
+from discs.running.failure import NotReached
 
 
 def row_of(index, *more):
