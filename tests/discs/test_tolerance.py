@@ -13,7 +13,7 @@ from continuum import breathing_ring, rolling_rod, steered_rod, untwisting_rod
 from discs import Gauss6, Gauss8, SimulationError, State, checks, load, simulate
 from discs.integrators import DOP853
 from discs.running.failure import NotReached
-from discs.running.horizon import horizon
+from discs.running.held import held_until
 from discs.running.tolerance import ATTEMPTS, answered, to_tolerance
 from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
@@ -261,7 +261,7 @@ def test_a_chaotic_motion_is_followed_as_long_as_rounding_allows():
     problem = rolling_at_random(17, 200.0)
     with pytest.raises(NotReached, match=r"tol = 0.001 cannot be held from t = .* on, with any step") as caught:
         simulate(problem, tol=1e-3, frames=3, progress=False)
-    until = caught.value.horizon
+    until = caught.value.held_until
     times = np.array([0.6, 1.4]) * until
     one, other = (simulate(problem, "gauss6", dt, times, progress=False) for dt in (0.02, 0.016))
     near, late = (np.abs(one.theta - other.theta).max(axis=1)) / np.abs(one.theta).max()
@@ -270,12 +270,12 @@ def test_a_chaotic_motion_is_followed_as_long_as_rounding_allows():
         simulate(problem, frames=3, progress=False)
     run = simulate(replace(problem, duration=0.6 * until), tol=1e-3, frames=[0.6 * until], progress=False)
     assert np.abs(run.theta - one.theta[0]).max() <= 1e-3 * np.abs(run.theta).max()
-    assert pickle.loads(pickle.dumps(caught.value)).horizon == until
+    assert pickle.loads(pickle.dumps(caught.value)).held_until == until
 
 
-def test_a_long_regular_motion_has_no_horizon():
+def test_a_long_regular_motion_can_be_followed():
     problem = lump(untwisting_rod(duration=400.0), 9)
-    looked = horizon(problem, Gauss8(), 0.05, 400.0, dict.fromkeys(("x", "y", "theta"), 1e-3))
+    looked = held_until(problem, Gauss8(), 0.05, 400.0, dict.fromkeys(("x", "y", "theta"), 1e-3))
     assert answered(looked, lambda *request: simulate(*request, progress=False)) == np.inf
 
 

@@ -5,8 +5,9 @@ three runs that are compared at COUNT times:
 
 1. A run with steps h and one with steps h/FINER agree within the tolerances until a time t_1: until then h resolves the motion.
 2. A run with steps h whose initial positions differ by one unit in the last place leaves the tolerances at a time t_2.
-3. If t_1 is at least RESOLVED times t_2, the growth is that of the motion and not of unresolved steps, and t_2 is the horizon. It
-   hardly depends on h: a change grows from rounding to the tolerance, and shorter steps only make other roundings.
+3. If t_1 is at least RESOLVED times t_2, the growth is that of the motion and not of unresolved steps, and t_2 is the time until
+   which tolerances can be held. It hardly depends on h: a change grows from rounding to the tolerance, and shorter steps only make
+   other roundings.
 
 Sweeps converge to CONVERGED, as what they leave grows, too.
 """
@@ -28,7 +29,7 @@ RESOLVED = 0.4
 CONVERGED = 1e-15  # tolerance of sweeps
 
 
-def horizon(
+def held_until(
     problem: Problem, integrator: Integrator, dt: float, end: float, bound: Mapping[str, float]
 ) -> Generator[tuple[Problem, Integrator, float, Float], Solution, float]:
     """The time from which on no step holds the tolerances `bound`; infinite if it is after `end` or not shown by steps of dt."""
