@@ -5,7 +5,7 @@ tolerance of 1e-2 to 1e-8; both are log-uniform. The reference is "gauss8" with 
 result, which is eight times shorter than any step of its search, or more. The error of the reference is its difference from a run
 with half as many steps. A reference whose error is more than a fifth of the tolerance is not used.
 
-A refusal must be justified. That rounding is the limit, at the end or from some time on, is shown by the search itself. A lost
+A refusal must be justified. That rounding is the limit is shown by the search itself. A lost
 heading is checked by "gauss8" with steps three times shorter than those that lost it: a heading must be lost again, at the same
 time.
 """
@@ -111,7 +111,7 @@ def _judged(problem: Problem, found: Solution, row: Row, seconds: float) -> Row:
 
 def _shown(problem: Problem, error: Exception, seconds: float) -> str:
     """Whether a refusal is justified, in words."""
-    if any(words in str(error) for words in ("rounding is the limit", "cannot be held from")):
+    if "rounding is the limit" in str(error):
         return "rounding"
     if not isinstance(error, SimulationError) or not error.step:
         return ""

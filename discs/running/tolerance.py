@@ -19,10 +19,7 @@ Input: a problem, tolerances and frames. Output: a run within the tolerances, wi
    place. If they differ by a tenth of the error or more, or if sweeps that converged to rounding may leave as much, rounding is
    the limit, and `NotReached` is raised. For tolerances below FINE, or after LATE runs, this test is made as soon as errors are
    below RESOLVED; if the difference exceeds the tolerance, no step can reach it.
-6. If LONG steps or more leave an error of LARGE, the motion may be one whose small changes grow: the time until which it can be
-   followed is looked for (`discs.running.held`), with the method of the highest order, and again after AGAIN times as many steps.
-   If it is before the end, `NotReached` says from which time on the tolerance cannot be held.
-7. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
+6. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
    ends there, provided that its |r'| one step before is below ENDED and that two runs in a row lose it at the same time.
 
 The tolerance of sweeps is such that all steps together leave an error of SWEPT times the tolerance
@@ -45,7 +42,6 @@ from discs.running import estimates
 from discs.running.by_dop853 import search_explicit
 from discs.running.estimates import LEAST_ORDER
 from discs.running.failure import NotReached, SimulationError
-from discs.running.held import held_until
 from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
 from discs.solution import Solution
@@ -61,8 +57,6 @@ AIM = 1.3  # the next run aims at the tolerance over this
 RESOLVED = 1e-2  # relative error below which the effect of rounding is tested
 FINE = 1e-9  # tolerance below which the effect of rounding is tested early
 LATE = 8  # runs after which it is tested in any case
-LONG, AGAIN, LONGER = 4000, 8, 4.0  # step 6: steps from which on that time is looked for, and again; steps there, in units of dt
-LARGE = 0.3  # relative error for that
 SLOWEST = 2.0  # least order by which the number of steps is chosen: a smaller one is that of waves that are not resolved yet
 ENDED = 0.01  # |r'| of a disc one step before it loses its heading; if it is larger, the step is too long
 ATTEMPTS, FAILURES = 28, 16  # runs at most, and failures among them
@@ -188,7 +182,7 @@ def search(
     sweeps: dict[float, Integrator] = {}  # the method with its tolerance of sweeps, by the step of a run
     size: dict[str, float] = {}
     failure: SimulationError | None = None
-    looked, stalls, failures, best_yet, long = False, 0, 0, np.inf, LONG
+    looked, stalls, failures, best_yet = False, 0, 0, np.inf
 
     def told(longer: Solution, shorter: Solution, limit: str) -> Solution:
         """The run with longer steps, with estimates of all its errors."""
@@ -238,11 +232,6 @@ def search(
         best_yet = min(best_yet, worst)
         due = not looked and (attempt >= LATE or least_tol < FINE)
         relative = max(errors[name] / size[name] for name in bound)
-        if relative > LARGE and shorter.stats["steps"] >= long:
-            long = AGAIN * shorter.stats["steps"]
-            until = yield from held_until(problem, higher[-1] if higher else integrator, LONGER * shorter.stats["dt"], end, bound)
-            if until < end:
-                raise NotReached(least_tol, worst, longer.stats["dt"], None, told(longer, shorter, limit), attempt, until)
         resolved = due and relative < RESOLVED
         if resolved or (stalls and not higher):
             looked = True

@@ -13,8 +13,7 @@ from continuum import breathing_ring, rolling_rod, steered_rod, untwisting_rod
 from discs import Gauss6, Gauss8, SimulationError, State, checks, load, simulate
 from discs.integrators import DOP853
 from discs.running.failure import NotReached
-from discs.running.held import held_until
-from discs.running.tolerance import ATTEMPTS, answered, to_tolerance
+from discs.running.tolerance import ATTEMPTS, to_tolerance
 from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
 pytestmark = pytest.mark.slow
@@ -248,35 +247,6 @@ def test_what_hardly_moves_is_no_larger_than_it_is():
     run = simulate(problem, tol=8e-8, frames=6, progress=False, engine="compiled")
     assert run.stats["method"] == "DOP853"
     assert max(np.abs(run.y).max(), np.abs(run.theta).max()) <= 3e-13
-
-
-def rolling_at_random(n, duration):
-    """A twisted rod that rolls as a whole: its motion is chaotic, that of the rod at rest is not."""
-    problem = lump(untwisting_rod(duration=duration), n)
-    return replace(problem, initial=replace(problem.initial, omega=np.ones(n)))
-
-
-def test_a_chaotic_motion_is_followed_as_long_as_rounding_allows():
-    """The time is named: until shortly before it a run holds the tolerance, after it two fine runs of another method differ."""
-    problem = rolling_at_random(17, 200.0)
-    with pytest.raises(NotReached, match=r"tol = 0.001 cannot be held from t = .* on, with any step") as caught:
-        simulate(problem, tol=1e-3, frames=3, progress=False)
-    until = caught.value.held_until
-    times = np.array([0.6, 1.4]) * until
-    one, other = (simulate(problem, "gauss6", dt, times, progress=False) for dt in (0.02, 0.016))
-    near, late = (np.abs(one.theta - other.theta).max(axis=1)) / np.abs(one.theta).max()
-    assert near < 1e-3 < late
-    with pytest.warns(UserWarning, match=r"cannot be held from t = .* on, .*: this is the last run"):
-        simulate(problem, frames=3, progress=False)
-    run = simulate(replace(problem, duration=0.6 * until), tol=1e-3, frames=[0.6 * until], progress=False)
-    assert np.abs(run.theta - one.theta[0]).max() <= 1e-3 * np.abs(run.theta).max()
-    assert pickle.loads(pickle.dumps(caught.value)).held_until == until
-
-
-def test_a_long_regular_motion_can_be_followed():
-    problem = lump(untwisting_rod(duration=400.0), 9)
-    looked = held_until(problem, Gauss8(), 0.05, 400.0, dict.fromkeys(("x", "y", "theta"), 1e-3))
-    assert answered(looked, lambda *request: simulate(*request, progress=False)) == np.inf
 
 
 def test_coordinates_that_hardly_move_are_resolved():
