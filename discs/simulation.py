@@ -271,7 +271,7 @@ def _run(
             if checkpoint is not None:
                 record.pause(f + 1, march)
         work = march.work
-        told: Stats = about | {"steps": march.step, "gradients": work.gradients, "solves": work.solves}
+        told: Stats = about | {"steps": work.taken or march.step, "gradients": work.gradients, "solves": work.solves}
         told["unconverged"] = work.unconverged
         if work.unconverged:
             short = sum(steps_before(time, h)[1] > 0 for time in times.tolist())

@@ -164,6 +164,7 @@ class Course:
         while self.solver.t < time:
             self.past += self._spent(self.solver.t, work)
             message = self.solver.step()
+            work.taken += 1
             if self.solver.status == "failed":
                 raise ArithmeticError(f"{type(self.solver).__name__} failed at t = {self.solver.t:g}: {message}")
         work.gradients, work.solves = self.solver.nfev, self.solver.nlu
@@ -204,13 +205,13 @@ class DOP853(SolveIvp):
         from discs.kernels import dop853
 
         state = Phase(z.hi, z.lo, np.array(z.pi, ndmin=2))
-        done, evaluations = dop853.run(
+        done, taken, evaluations = dop853.run(
             dop853.coefficients(), chain, state, self.rtol, self.atol, h, bound, album.times, album.q, album.rates, album.told
         )
         if done < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut
-        return Work(gradients=evaluations) if done == album.times.size else None
+        return Work(gradients=evaluations, taken=taken) if done == album.times.size else None
 
 
 class Radau(SolveIvp):

@@ -19,6 +19,7 @@ class Work:
     gradients : evaluations of grad V.
     solves : banded linear systems.
     unconverged : implicit steps that reached their limit of sweeps.
+    taken : steps that an adaptive method took; 0 for methods with fixed steps.
     spent : (4,), the work of loads and the energy that they dissipate, each with its lost digits. With `shares` (4, 1 + L): that
         of all loads, and that of each.
     shares : the loads one by one, if asked for.
@@ -27,6 +28,7 @@ class Work:
     gradients: int = 0
     solves: int = 0
     unconverged: int = 0
+    taken: int = 0
     spent: Float = field(default_factory=lambda: np.zeros(4))
     shares: Shares | None = None
 

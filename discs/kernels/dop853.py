@@ -55,8 +55,8 @@ class Motion(NamedTuple):
 def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told):
     """The frames at `times` (F,) of the motion from a state at t = 0, recorded as in `discs.kernels.driver.march`.
 
-    Returns the number of frames recorded and of evaluations. The run ends early if its steps become too short, if the kinetic
-    energy exceeds `bound`, or if a heading vanishes; the number of frames is -1 after Ctrl-C.
+    Returns the numbers of frames recorded, of steps taken and of evaluations. The run ends early if its steps become too short, if
+    the kinetic energy exceeds `bound`, or if a heading vanishes; the number of frames is -1 after Ctrl-C.
     """
     rows, n = state.hi.shape
     work, still, c, v, slope = do.workspace(chain), np.zeros((rows, n)), np.empty((rows, n)), np.empty((rows, n)), np.zeros((2, n))
@@ -67,7 +67,7 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
         Motion(np.empty((rows, n)), np.empty_like(state.pi)),
         Motion(np.empty((rows, n)), np.empty_like(state.pi)),
     )
-    t, done, h, shown = 0.0, 0, 0.0, False
+    t, done, taken, h, shown = 0.0, 0, 0, 0.0, False
     rate(chain, work, t, now, c, still, k, 0)
     do.lost(chain, work, slope)
     if times.size and times[0] == 0.0:
@@ -78,12 +78,12 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
     evaluations = 2
     while done < times.size:
         if interrupted(now.q.size):
-            return -1, evaluations
+            return -1, taken, evaluations
         least, rejected = 10 * (np.nextafter(t, np.inf) - t), False
         h = min(max(h, least), longest)
         while True:
             if not h >= least:
-                return done, evaluations
+                return done, taken, evaluations
             end = t + h
             h = end - t
             for stage in range(1, STAGES):
@@ -102,7 +102,7 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
             for i in range(n):
                 kinetic += 0.5 * then.p[row, i] ** 2
         if do.lost(chain, work, slope) >= 0 or not kinetic <= bound:
-            return done, evaluations
+            return done, taken, evaluations
         shown = False
         while done < times.size and times[done] <= end:
             if not shown:
@@ -119,11 +119,11 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
             place = Phase(inside.q, still, inside.p)
             do.frame(chain, work, place, c, v, q[:, done], rates[:, done], told[:, done])
             done += 1
-        t, now, then = end, then, now
+        t, now, then, taken = end, then, now, taken + 1
         copy(k.q[STAGES], k.q[0])
         copy(k.p[STAGES], k.p[0])
         h *= min(1.0, factor) if rejected else factor
-    return done, evaluations
+    return done, taken, evaluations
 
 
 @part

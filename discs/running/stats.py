@@ -19,7 +19,7 @@ class Stats(TypedDict, total=False):
     engine: str  # "compiled" or "plain"
     plain_because: str  # why it is "plain"
     want: list[str]
-    dt: float  # time step
+    dt: float  # time step; of adaptive methods the longest
     dt_suggested: bool  # whether dt was chosen by `suggest_dt`
     tol: float | dict[str, float]  # the tolerance asked for
     attempts: int  # runs made to reach the tolerance
@@ -27,7 +27,7 @@ class Stats(TypedDict, total=False):
     limited_by: str  # what determined the accuracy: "tolerance", "fewest steps" or "sweeps", see `discs.running.tolerance`
 
     # cost
-    steps: int
+    steps: int  # of adaptive methods those taken, not those tried
     short_steps: int  # steps to frames between two steps; given only if some steps did not converge
     gradients: int  # evaluations of grad V
     solves: int  # banded linear systems

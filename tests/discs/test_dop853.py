@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from discs import SimulationError, simulate
+from discs.chains.twist import untwisting_chain
 from discs.integrators import DOP853
 from tests.conftest import Model, models, uneven
 
@@ -44,3 +45,18 @@ def test_runs_that_fail_do_so_step_by_step(monkeypatch):
             simulate(problem, "DOP853", 0.1, engine=engine, progress=False)
         said.append(str(failure.value))
     assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau"])
+def test_steps_taken_are_counted(method):
+    run = simulate(untwisting_chain(5, duration=2.0), method, dt=1.0, frames=3, engine="plain", progress=False)
+    each = {"DOP853": 12, "Radau": 2}[method]  # evaluations a step, at least
+    assert 2 < run.stats["steps"] <= run.stats["gradients"] / each
+
+
+def test_both_engines_take_the_same_steps(kernels_as_python):
+    runs = [
+        simulate(untwisting_chain(5, duration=1.0), "DOP853", dt=1.0, frames=3, engine=e, progress=False)
+        for e in ("plain", "compiled")
+    ]
+    assert runs[0].stats["steps"] == runs[1].stats["steps"] > 2
