@@ -1,19 +1,22 @@
 """Kernels compiled by a process of their own, while runs go on without them: what `engine="auto"` does.
 
 A process is started by the first run that finds a kernel missing, and is sent functions to call, one after the other: each calls
-its kernels once, which compiles them into the cache on disc. It outlives the run that started it, until they are all there. Worker
+its kernels once, which compiles them into the cache on disc. It outlives the run that started it, until they are all there. Where
+several such processes run, they take turns, so that a kernel is not compiled by each. Worker
 processes wait for their kernels instead, unless `compiling_aside`; so do machines without a cache.
 """
 
+import hashlib
 import multiprocessing
 import os
 import pickle
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -134,20 +137,38 @@ class Kernels:
         return self._there
 
 
-def _serve() -> None:
+@contextmanager
+def _turn(name: str) -> Iterator[None]:
+    """Wait for the other processes of this user that compile into the same cache; not at all where files cannot be locked."""
+    cache = os.environ.get("NUMBA_CACHE_DIR", "") + os.fspath(Path(__file__).resolve().parent)
+    with ExitStack() as opened:
+        with suppress(ImportError, OSError, AttributeError):
+            import fcntl
+
+            name = f"rolling-discs-{os.getuid()}-{hashlib.sha256(os.fsencode(cache)).hexdigest()[:12]}-{name}.lock"
+            file = Path(tempfile.gettempdir(), name)
+            held = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
+            opened.callback(os.close, held)
+            fcntl.flock(held, fcntl.LOCK_EX)
+        yield
+
+
+def _serve(turn: str) -> None:
     """Call the functions that are sent, until there are no more."""
     while True:
         try:
             prepare, arguments = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        prepare(*arguments)
+        with _turn(turn):
+            prepare(*arguments)
 
 
 if __name__ == "__main__":
-    if "aside" in sys.argv:
+    aside = "aside" in sys.argv
+    if aside:
         with suppress(AttributeError, OSError):
             os.nice(19)
         with suppress(OSError):  # Linux may share processors among sessions first, and this process has one of its own
             Path("/proc/self/autogroup").write_text("19")
-    _serve()
+    _serve("aside" if aside else "soon")  # nobody waits for a process of the lowest priority

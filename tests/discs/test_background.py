@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import threading
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -189,3 +190,20 @@ def test_a_missing_kernel_is_found_without_importing_numba(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     told = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True).stdout
     assert told == "plain False\n"
+
+
+def test_processes_that_compile_take_turns(monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    order = []
+
+    def other():
+        with background._turn("soon"):
+            order.append("other")
+
+    with background._turn("soon"), background._turn("aside"):  # each has a turn of its own
+        thread = threading.Thread(target=other)
+        thread.start()
+        time.sleep(0.2)
+        order.append("first")
+    thread.join(10)
+    assert order == ["first", "other"]
