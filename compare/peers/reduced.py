@@ -154,6 +154,7 @@ def band(problem: Problem, f: Bound) -> dict[str, Any]:
     options = banded(problem, f.reduced.width)
     if problem.system.closed:
         return options
+    f.start(np.inf)  # the time of the method that ran before is no limit here
     width, size = f.reduced.width, f.y0.size
     y = f.y0 + 1e-3 * np.random.default_rng(1).standard_normal(size)
     lower = upper = 0

@@ -262,3 +262,15 @@ def test_own_scene(tmp_path, monkeypatch, capsys):
     assert (name, scene.closed, scene.rod.radius, scene.duration) == ("breathing ring", True, 0.7, 0.3)
     assert main([*arguments, "--scenes", "unit"]) == 2
     assert "--scene FILE.toml takes the place of --scenes" in capsys.readouterr().err
+
+
+def test_a_method_that_was_cut_off_leaves_time_for_the_next():
+    """CVODE finds its bands by the right-hand side that SciPy's methods have used up the time of."""
+    pytest.importorskip("sksundae")
+    problem = lump(untwisting_rod(duration=0.2), 40)
+    f = reduced.Bound(problem)
+    scipy_peer = next(peer for peer in reduced.scipy_peers(problem, f) if peer.name == "SciPy BDF")
+    with pytest.raises(Cutoff):
+        scipy_peer.run(1e-9, 1e-3)
+    cvode = reduced.sundials_peers(problem, f)[0]
+    assert cvode.run(1e-3, 10.0).seconds > 0
