@@ -135,6 +135,7 @@ class SkewGradient(ABC):
     rows : names of the rows of q.
     scale : (rows,), unit of each coordinate for tolerances: a length, or a radian.
     quadratic : whether V is quadratic; secants then do not depend on the step.
+    renewed : whether each sweep of the midpoint rule solves with a matrix of its own; otherwise the first one serves all.
     load : f, or None for none; then nothing is computed for it.
     lanes : parameters for compiled steps in lanes; None for none.
     """
@@ -143,6 +144,7 @@ class SkewGradient(ABC):
     rows: tuple[str, ...]
     scale: Float
     quadratic: bool
+    renewed: bool = True
     load: Load | None = None
     lanes: Parameters = None
 

@@ -62,7 +62,7 @@ class SteeredSystem(RollingDiscs):
     """The equations of motion of a `SteeredChain`."""
 
     rows = ("x", "y", "theta", "phi")
-    quadratic = False
+    quadratic = renewed = False
     vanishing = False
 
     def __init__(self, chain: SteeredChain, load: Load | None = None) -> None:

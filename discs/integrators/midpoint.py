@@ -79,7 +79,7 @@ class Midpoint(OneStep):
             c = system.basis(system.moved(shape, move))
             velocity = system.forward(c, p)
             secant = system.secant(shape, h * velocity)
-            if guide is None or system.quadratic:
+            if guide is None or system.renewed:
                 guide = secant, c
             pull = system.pull(c, system.mean_force(secant), t + 0.5 * h, z, 0.5 * h * velocity, p)
             middle = z.hi + 0.5 * h * velocity

@@ -185,13 +185,13 @@ def test_spectrum_of_a_chain_is_symmetric():
 def test_error_bars_cover_the_exponents_of_a_regular_motion(omega):
     """By the unit law a straight ring is stable: all exponents are zero, while changes grow like t and vectors turn slowly."""
     problem = rolling_ring(omega)
-    problem = replace(problem, chain=replace(problem.chain, rolling="unit"), duration=60.0)
+    problem = replace(problem, chain=replace(problem.chain, rolling="unit"), duration=120.0)
     found = lyapunov(problem, count=20, dt=0.2, method="midpoint")
     off = np.abs(found.exponent) / found.error
     assert (off < 1).mean() >= 0.9  # 18 of 20; a part of the bar is a standard error
-    assert (off < 2).all()  # of twelve durations near 60 the largest is 1.36
+    assert (off < 1.5).all()
     assert found.exponent[0] > 0.01  # the transient, which the bar must contain
-    assert (found.error < 0.25).all()  # of these 0.17
+    assert (found.error < 0.15).all()
 
 
 def test_error_bars_cover_the_rates_of_an_unstable_motion():
