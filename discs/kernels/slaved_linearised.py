@@ -4,6 +4,7 @@ The headings are r' = (d_i + d_{i+1})/2k along x and along y, from the links bes
 links of free ends. The plain twin is `discs.analysis.stages`.
 """
 
+from discs.chains.links.linear import fold
 from discs.kernels import linearised
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
@@ -77,25 +78,15 @@ def _turn_back(chain, at, j, m, nu, to):
 @part
 def release(ends, to):
     """The transpose of `discs.kernels.slaved.close_ends`, for a row of links."""
-    n = to.size - 1
-    if ends == RING:
-        to[n] += to[0]
-        to[0] = to[n]
-        return
-    first, last = to[0], to[n]
-    if ends == GHOST:
-        to[1] += 3 * first
-        to[2] -= 3 * first
-        to[3] += first
-        to[n - 1] += 3 * last
-        to[n - 2] -= 3 * last
-        to[n - 3] += last
-    else:
+    fold(ends, to)
+    if ends != RING and ends != GHOST:
+        n = to.size - 1
+        first, last = to[0], to[n]
         to[1] += 2 * first
         to[2] -= first
         to[n - 1] += 2 * last
         to[n - 2] -= last
-    to[0], to[n] = 0.0, 0.0
+        to[0], to[n] = 0.0, 0.0
 
 
 @fill(linearised.weigh, Slaved)

@@ -46,7 +46,8 @@ def simulate_many(
     law, number of discs, duration and step in common, run eight at a time in the lanes of a vector, by the midpoint method, its
     compositions, Gauss and Radau methods, where nothing is in `want`. Their sweeps go on until all eight have converged, and
     `stats["solves"]` counts these: numbers agree with those of `simulate` to the tolerance of sweeps, by default some units in the
-    last place. All other runs go one by one.
+    last place. With a tolerance they search among implicit methods, where `simulate` takes "DOP853" for few discs; both keep the
+    tolerance. All other runs go one by one.
 
     Parameters
     ----------

@@ -231,8 +231,7 @@ def search(
         stalls = stalls + 1 if not first and (seen <= LEAST_ORDER or worst >= best_yet) else 0
         best_yet = min(best_yet, worst)
         due = not looked and (attempt >= LATE or least_tol < FINE)
-        relative = max(errors[name] / size[name] for name in bound)
-        resolved = due and relative < RESOLVED
+        resolved = due and max(errors[name] / size[name] for name in bound) < RESOLVED
         if resolved or (stalls and not higher):
             looked = True
             other = yield estimates.nudged(problem), sharp, dt, found.t
