@@ -68,8 +68,9 @@ def growth(problem: Problem, dt: float | None = None, method: str = "gauss4", mo
     steps = max(1, int(np.ceil(problem.duration / h - 1e-9)))
     h = problem.duration / steps
     unit, y, found = np.repeat(problem.system.scale, problem.chain.n), flow.start, [1.0]
-    errors = np.zeros((y.size, len(problem.system.rows) * WAVES))
-    errors[: unit.size] = _waves(problem) * unit[:, None]
+    waves = _waves(problem)
+    errors = np.zeros((y.size, waves.shape[1]))
+    errors[: unit.size] = waves * unit[:, None]
     for i in range(steps):
         if found[-1] >= min(most, MOST):
             break
@@ -91,7 +92,9 @@ def horizon(problem: Problem, tolerance: float, dt: float | None = None, method:
 
 
 def _waves(problem: Problem) -> Float:
-    """The first waves of each coordinate, (rows n, rows waves), orthonormal: cosines, on a ring sines too."""
+    """The first waves of each coordinate, (rows n, rows waves), orthonormal: cosines, on a ring sines too. Of fewer discs than
+    waves, all shapes.
+    """
     n, ring = problem.chain.n, problem.chain.ends == "ring"
     j, at = np.arange(WAVES), (np.arange(n) if ring else np.arange(n) + 0.5)[:, None] / n
     waves = np.cos(2 * np.pi * ((j + 1) // 2) * at - np.pi / 2 * (1 - j % 2) * (j > 0)) if ring else np.cos(np.pi * j * at)
