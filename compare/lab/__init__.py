@@ -4,8 +4,9 @@ Modules, from the inside out:
 
 * `settings`: what a page can choose, and the scene, the problem, the program and the file that follow;
 * `session`: one live simulation. It takes messages, {"kind": ...}, and gives replies: objects and, of frames, 32-bit floats.
-  It knows no network, and is tested without a browser. `messages` is the schema of what it takes; `history` the frames that
-  are kept; `beside` the field, computed by another process; `engine` the kernels, read by a thread; `drawing` what is drawn;
+  It knows no network, and is tested without a browser. `messages` is the schema of what it takes; `history` the frames that are
+  kept; `hand` what pulls and holds discs; `beside` the field, computed by another process; `engine` the kernels, read by a thread;
+  `drawing` what is drawn;
 * `server`: pages of a browser, on 127.0.0.1, by tornado. `widget`: the same in a notebook, by anywidget. Both pass messages on.
 * `data`: the page, one ES module for both, made of three.js, of the drawing code of `run.view` and of `lab.js`.
 

@@ -2,13 +2,14 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Executor, Future
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from compare.background import Workers
+from compare.lab.settings import Settings
 from continuum import Scene, solve
 from continuum.solver import spline
 from discs.arrays import Float
@@ -16,6 +17,7 @@ from discs.arrays import Float
 TOLERANCE = 2e-3  # of the field, loose: the discs of a lab are farther away
 FRAMES = 181
 MOST = 8  # fields that are remembered
+SETTLED = 0.4  # seconds without a change before the field is computed
 
 
 class Field(NamedTuple):
@@ -86,3 +88,48 @@ class Fields:
                 self._workers.shutdown(wait=False, cancel_futures=True)
             self._workers = None
             self._kept.clear()
+
+
+class Beside:
+    """The field that one session compares its discs with: whether it is asked for, on its way, or there.
+
+    Parameters
+    ----------
+    fields : computes fields; None shows none.
+    clock : seconds.
+    """
+
+    def __init__(self, fields: Fields | None, clock: Callable[[], float]) -> None:
+        self.on = fields is not None
+        self._fields, self._clock, self._changed = fields, clock, clock()
+        self._future: Future[Field] | None = None
+
+    def show(self, on: bool) -> None:
+        """Show it, or not."""
+        self.on = on and self._fields is not None
+
+    def change(self, again: bool) -> None:
+        """The settings have changed; `again` : from t = 0, so another field belongs to them."""
+        self._changed = self._clock()
+        if again:
+            self._future = None
+
+    def look(self, settings: Settings, s: Float) -> None:
+        """Ask for the field of the settings, at the places s of the discs, when nothing has changed for a while."""
+        if self._fields is not None and self.on and self._future is None and self._clock() - self._changed > SETTLED:
+            self._future = self._fields.ask(settings.of_field, settings.make_scene(), s)
+
+    def told(self, touched: bool) -> tuple[str, Field | None]:
+        """What the page says of the field, and the field if it can be shown."""
+        if not self.on:
+            return "", None
+        if touched:
+            return "The field is that of an untouched run: press Reset to compare with it.", None
+        if self._future is not None and self._future.cancelled():
+            self._future = None
+        if self._future is None or not self._future.done():
+            return "The field is being computed.", None
+        error = self._future.exception()
+        if error is not None:
+            return f"There is no field for this scene: {error}", None
+        return "", self._future.result()

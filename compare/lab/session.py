@@ -15,31 +15,27 @@ scene: the field is hidden until the motion starts again, with the new values.
 
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from compare.lab import drawing, files
-from compare.lab.beside import Field, Fields
+from compare.lab.beside import Beside, Fields
 from compare.lab.engine import Engines
+from compare.lab.hand import Hand
 from compare.lab.history import History, Kept
 from compare.lab.messages import checked
 from compare.lab.settings import Settings
 from compare.lab.shifted import later
 from discs import Problem, SimulationError, steps, suggest_dt
 from discs.integrators import find
-from discs.loads import Motor, Spring
-from discs.loads.binding import OnRod
 from discs.running.moments import Moment
 from discs.warn import kept
 
 BUDGET = 0.04  # seconds of computing for one message
 SEGMENT = 1000.0  # time after which steps begin anew
-SETTLED = 0.4  # seconds without a change before the field is computed
-PULL = 0.5  # stiffness of the spring of the hand: times the largest of beta, K and 1, over the length of a link, at most 20
 
 
 class Reply(NamedTuple):
@@ -47,29 +43,6 @@ class Reply(NamedTuple):
 
     content: dict[str, Any]
     data: bytes = b""
-
-
-@dataclass
-class Hand:
-    """What the hand does: pull a disc to a place, hold discs."""
-
-    pulled: tuple[int, float, float] | None = None
-    held: set[int] = field(default_factory=set)
-
-    def loads(self, problem: Problem) -> tuple[OnRod, ...]:
-        """Its loads."""
-        chain = problem.chain
-        found: list[OnRod] = []
-        if self.pulled is not None:
-            disc, x, y = self.pulled
-            stiff = max(1.0, float(np.max(chain.torsion_stiffness)), float(np.max(chain.bending_stiffness)))
-            found.append(Spring(x, y, min(PULL * stiff / chain.k, 20.0), at=float(chain.s[disc])))
-        for disc in sorted(self.held):
-            at = float(chain.s[disc])
-            found.append(Motor(0.0, at))
-            if problem.initial.phi is not None:
-                found.append(Motor(0.0, at, about="turn"))
-        return tuple(found)
 
 
 class Session:
@@ -91,10 +64,8 @@ class Session:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.settings = settings or Settings()
-        self._fields, self._engines, self._clock = fields, engines, clock
-        self._compares = fields is not None
-        self._future: Future[Field] | None = None
-        self._asked: object = None
+        self._engines, self._clock = engines, clock
+        self.beside = Beside(fields, clock)
         self.notes: list[str] = []
         with kept() as told:
             self._start(self.settings)
@@ -108,7 +79,6 @@ class Session:
     _began: float  # time at which the present segment began, with work and dissipation so far
     _work_before: float
     _dissipated_before: float
-    _changed: float  # when the settings changed last, by the clock
     _invariant: float
     history: History
     hand: Hand
@@ -211,7 +181,7 @@ class Session:
         return [self._frame()]
 
     def _on_compare(self, on: bool) -> list[Reply]:
-        self._compares = on and self._fields is not None
+        self.beside.show(on)
         self._look()
         return [self._frame()]
 
@@ -240,11 +210,11 @@ class Session:
             self.settings = self._begun_with = settings
             self._base = settings.make_problem()
             self.hand, self.touched, self.stopped, self._debt = Hand(), False, "", 0.0
-            self._changed, self._future = self._clock(), None
             self._continue(Kept(0.0, self._base.initial, self._base.energy(), 0.0, 0.0, False))
             self._invariant = self.moment.energy
             self.history = History(self._base.chain.n)
             self.history.add(self._kept())
+        self.beside.change(again=True)
 
     def _live(self, settings: Settings) -> None:
         """Go on with other settings from where the discs are."""
@@ -253,9 +223,10 @@ class Session:
             if last.t > 0:
                 self.touched = self.touched or settings.of_field != self._begun_with.of_field
             else:
-                self._begun_with, self._future = settings, None
-            self.settings, self._base, self._changed, self.stopped = settings, settings.make_problem(), self._clock(), ""
+                self._begun_with = settings
+            self.settings, self._base, self.stopped = settings, settings.make_problem(), ""
             self._continue(last)
+        self.beside.change(again=last.t == 0)
 
     def _touch(self, hand: Hand, last: Kept | None = None) -> None:
         """Go on with another hand, and perhaps from another state."""
@@ -341,30 +312,9 @@ class Session:
         untouched = not self.touched and self.settings == self._begun_with
         return files.run_of(self.history, self._base if untouched else None, self.settings, self.problem.chain.s)
 
-    # ---- the field
-
     def _look(self) -> None:
-        """Ask for the field when nothing has changed for a while."""
-        if self._fields is None or not self._compares or self._future is not None or self.touched:
-            return
-        if self._clock() - self._changed > SETTLED:
-            self._future = self._fields.ask(self._begun_with.of_field, self._begun_with.make_scene(), self.problem.chain.s)
-
-    def _beside(self) -> tuple[str, Field | None]:
-        """What the page says of the field, and the field if it can be shown."""
-        if not self._compares:
-            return "", None
-        if self.touched:
-            return "The field is that of an untouched run: press Reset to compare with it.", None
-        if self._future is None or not self._future.done():
-            return "The field is being computed.", None
-        if self._future.cancelled():
-            self._future = None
-            return "The field is being computed.", None
-        error = self._future.exception()
-        if error is not None:
-            return f"There is no field for this scene: {error}", None
-        return "", self._future.result()
+        if not self.touched:
+            self.beside.look(self._begun_with, self.problem.chain.s)
 
     # ---- replies
 
@@ -372,7 +322,7 @@ class Session:
         return Reply({"kind": "scene"} | drawing.description(self.settings, self.problem))
 
     def _frame(self, late: bool = False) -> Reply:
-        about, beside = self._beside()
+        about, beside = self.beside.told(self.touched)
         content, data = drawing.frame(self.moment, self.t, beside)
         if beside is not None and content["error"] is None:
             about = f"The field ends at t = {beside.t[-1]:g}, the duration of its scene."
@@ -385,7 +335,7 @@ class Session:
             "engine": self._engine,
             "beside": about
             if content["error"] is not None or about
-            else "The field was computed up to here only." * self._compares,
+            else "The field was computed up to here only." * self.beside.on,
             "held": sorted(self.hand.held),
             "pulled": None if self.hand.pulled is None else list(self.hand.pulled),
             "stopped": self.stopped,
