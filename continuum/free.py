@@ -10,8 +10,8 @@ from continuum.free_start import Data, Given, check
 from continuum.rod import Rod
 from discs import Solution, checks
 from discs.running.frames import frame_times
+from discs.running.once import MOST_STEPS
 from discs.running.stats import Stats
-from discs.simulation import MOST_STEPS
 
 MOST_NODES = 1_000_000
 

@@ -12,8 +12,9 @@ from discs.integrators.work import Stops
 def all_steps_before(times: Float, h: float) -> tuple[Int, Float]:
     """The whole steps before each time, and the time from there, (F,); as `discs.running.frames.steps_before`."""
     steps = (times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
-    rests = times - steps * h
-    return steps, np.where(rests > 1e-9 * h, rests, 0.0)
+    rests: Float = times - steps * h
+    rests[rests <= 1e-9 * h] = 0.0
+    return steps, rests
 
 
 class Album:

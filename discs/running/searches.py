@@ -12,10 +12,10 @@ from discs.problem import Problem
 from discs.running.abreast import FEWEST, side_by_side
 from discs.running.doubt import doubted
 from discs.running.failure import SimulationError
+from discs.running.once import run_fixed
 from discs.running.outcome import Outcome, add, fail
 from discs.running.stats import begun
 from discs.running.tolerance import Request, search_with_doubt
-from discs.simulation import run_fixed
 from discs.solution import Solution
 from discs.warn import kept
 

@@ -128,7 +128,7 @@ class After:
 def kernels_come(monkeypatch):
     def come(after):
         there = After(after)
-        monkeypatch.setattr("discs.simulation.kernels", lambda *rest, **more: there)
+        monkeypatch.setattr("discs.running.once.kernels", lambda *rest, **more: there)
         monkeypatch.setattr(fields, "Kernels", lambda *rest: there)
         monkeypatch.setattr(fields, "_PREPARED", set())
 
@@ -144,8 +144,9 @@ def test_a_run_is_plain_until_kernels_are_there_and_then_compiled(kernels_come):
     assert run.stats["engine"] == "plain"
     assert "not compiled yet" in run.stats["plain_because"]
     kernels_come(3)
-    overtaken, waited = (simulate(problem, dt=0.05, engine=engine) for engine in ("auto", "compiled"))
+    overtaken, waited = (simulate(problem, dt=0.05, want=iter(["velocity"]), engine=engine) for engine in ("auto", "compiled"))
     np.testing.assert_array_equal(overtaken.x, waited.x)
+    np.testing.assert_array_equal(overtaken.x_rate, waited.x_rate)
     assert overtaken.stats["engine"] == "compiled"
 
 

@@ -101,7 +101,7 @@ def test_the_memory_matters(tmp_path, monkeypatch):
 def test_a_finished_run_is_read(tmp_path, monkeypatch):
     problem, path = uneven(7, OPEN), tmp_path / "run.nc"
     first = simulate(problem, dt=0.05, frames=5, checkpoint=path, progress=False)
-    monkeypatch.setattr("discs.simulation.March", None)
+    monkeypatch.setattr("discs.running.once.March", None)
     same(simulate(problem, dt=0.05, frames=5, checkpoint=path, progress=False), first)
 
 
