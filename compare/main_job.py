@@ -40,6 +40,11 @@ def overview(
 
     Parameters
     ----------
+    scene : a scene of `continuum`.
+    out : folder to write to.
+    n : numbers of discs, increasing.
+    tol : tolerance of the field.
+    progress : show progress bars.
     executor : a `concurrent.futures` executor that runs energies and plain springs in parallel; processes need a scene that can be
         pickled.
     degree : 2 to compare discs of order four beside those of order two; own headings only.

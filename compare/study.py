@@ -32,15 +32,23 @@ def convergence(
 
     Parameters
     ----------
+    scene : a scene of `continuum`.
     n : numbers of discs, increasing, at least one.
     ends : see `lump`.
     field : the scene's `solve(scene, tol)`, computed if not given; its last frame must be at the end of the scene.
     dt : time step of the chains; None takes 300 steps, and at least eight for each of the field's.
     method : integrator of the chains; None for Suzuki's composition, "gauss6" with viscosity, "gauss8" for degree 2 and with
         ground forces, in which waves that steps do not resolve are large.
+    tol : tolerance of the field, if it is not given.
+    progress : show a progress bar.
     degree : see `lump`.
     want : further quantities, "velocity", "slope", "energy_density", "contact_force"; see `compare.quantities`. A given field must
         have them: `solve(scene, tol, want=want)`.
+
+    Raises
+    ------
+    ValueError : for numbers of discs that do not increase or do not fit the scene; for a field that is not that of the scene, up to
+        its end and with an error estimate.
     """
     sizes, problems = checked_sizes(scene, n, ends, degree)
     want = check_want(want, scene)

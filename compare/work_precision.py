@@ -76,7 +76,10 @@ class WorkPrecision:
         return list(dict.fromkeys((row.problem, row.n) for row in self.rows))
 
     def curve(self, problem: str, n: int, method: str, rms: bool = False) -> tuple[Float, Float]:
-        """Errors and seconds of a method, from loose to tight, without runs that are slower and less accurate than another one."""
+        """Errors and seconds of a method, from loose to tight, without runs that are slower and less accurate than another one.
+
+        problem, n, method : as in a `Row`. rms : errors in the 2-norm instead of the largest ones.
+        """
         mine = [r for r in self.rows if (r.problem, r.n, r.method) == (problem, n, method)]
         found = [(r.off(rms), r.seconds) for r in mine if r.off(rms) < 1]
         best = [(e, s) for e, s in found if not any(f <= e and t <= s and (f, t) != (e, s) for f, t in found)]
@@ -84,8 +87,11 @@ class WorkPrecision:
         return errors, seconds
 
     def time_at(self, error: float, problem: str, n: int, ours: bool, rms: bool = False) -> tuple[float, str]:
-        """The least time in which any method reaches an error (log-log interpolation between its runs), and its name;
-        infinite if none reaches it."""
+        """The least time in which any method reaches an error (log-log interpolation between its runs), and its name.
+
+        problem, n : as in a `Row`. ours : among our methods, otherwise among peers. rms : the error in the 2-norm. The time is
+        infinite if none reaches it.
+        """
         best = np.inf, ""
         for method in dict.fromkeys(r.method for r in self.rows if r.ours == ours):
             errors, seconds = self.curve(problem, n, method, rms)
@@ -95,7 +101,7 @@ class WorkPrecision:
         return best
 
     def speedups(self, errors: Iterable[float] = ERRORS, rms: bool = False) -> str:
-        """Ratio of times, fastest peer over ours, at equal error (largest, or in the 2-norm), as a table."""
+        """Ratio of times, fastest peer over ours, at each of `errors` (the largest ones, with `rms` in the 2-norm), as a table."""
         lines = ["| problem | N | error | ours | | fastest peer | | times |", "| --- " * 8 + "|"]
         for problem, n in self.problems:
             for error in errors:

@@ -43,8 +43,18 @@ def _rod(given: RodParameters) -> Rod:
 def untwisting_rod(rolling: str = "field", duration: float = 4.5, twist: float = 0.5, **parameters: Unpack[RodParameters]) -> Scene:
     """The paper's scene: a straight rod at rest, twisted by theta = -pi twist cos(pi s/length) and released.
 
-    `twist` is the number of turns between the two ends, in the paper 1/2. E(0) = beta pi**4 twist**2/(4 length), which is pi**4/80
-    for the paper's rod.
+    E(0) = beta pi**4 twist**2/(4 length), which is pi**4/80 for the paper's rod.
+
+    Parameters
+    ----------
+    rolling : law of rolling, "field" (the paper's) or "unit".
+    duration : time to simulate.
+    twist : number of turns between the two ends, in the paper 1/2.
+    parameters : of the `Rod`, numbers or functions of s; those that are not given have the paper's values.
+
+    Raises
+    ------
+    ValueError : for an unknown parameter, or a value outside its range.
     """
     rod = _rod(parameters)
     turns = checks.number("twist", twist)
@@ -63,7 +73,15 @@ def steered_rod(
 ) -> Scene:
     """The paper's twist for a rod whose sections have headings of their own, at rest with phi = 0; see `SteeredRod`.
 
-    With a `mounting_angle` the rod is at rest with phi = mounting_angle, by `discs.loads.Rest`, at pi/2 a wheeled snake.
+    Parameters
+    ----------
+    stretch_stiffness, shear_stiffness, heading_inertia : A, G and J of the `SteeredRod`, numbers or functions of s.
+    duration, twist, parameters : as for `untwisting_rod`; parameters are those that every rod has.
+    mounting_angle : rad; the rod is then at rest with phi = mounting_angle, by `discs.loads.Rest`: at pi/2 a wheeled snake.
+
+    Raises
+    ------
+    ValueError : for an unknown parameter, or a value outside its range.
     """
     for name in parameters:
         checks.choice("rod parameter", name, PAPER)
@@ -88,10 +106,21 @@ def rolling_rod(
     amplitude: float = 1e-6,
     **parameters: Unpack[RodParameters],
 ) -> Scene:
-    """A straight rod, periodic up to a shift, that rolls sideways at the rate `omega`, with a small perturbation.
+    """A straight rod, periodic up to a shift, that rolls sideways, with a small perturbation.
 
     The perturbation is the result of uneven rolling from the straight line: theta = amplitude cos(q s), y = R theta,
-    q = 2 pi mode/length.
+    q = 2 pi mode/length. How it grows is known: `continuum.dispersion`.
+
+    Parameters
+    ----------
+    rolling, duration, parameters : as for `untwisting_rod`.
+    omega : rate of roll, rad per time.
+    mode : number of waves along the rod, at least 1.
+    amplitude : of theta, rad.
+
+    Raises
+    ------
+    ValueError : for an unknown parameter, or a value outside its range.
     """
     rod = _rod(parameters)
     q = 2 * np.pi * checks.whole("mode", mode, 1) / rod.length
@@ -108,7 +137,19 @@ def rolling_rod(
 
 
 def breathing_ring(rolling: str = "field", duration: float = 0.5, omega: float = 0.4, **parameters: Unpack[RodParameters]) -> Scene:
-    """A circle of circumference `length` whose discs all roll at the rate `omega`, towards the centre if it is positive."""
+    """A circle of circumference `length` whose discs all roll at one rate, so that it stays a circle and breathes.
+
+    Its motion is known in closed form under both laws: `continuum.exact`.
+
+    Parameters
+    ----------
+    rolling, duration, parameters : as for `untwisting_rod`.
+    omega : rate of roll, rad per time; towards the centre if it is positive.
+
+    Raises
+    ------
+    ValueError : for an unknown parameter, or a value outside its range.
+    """
     rod = _rod(parameters)
     initial = partial(_circle, radius=rod.length / (2 * np.pi), omega=checks.number("omega", omega))
     return Scene(rod=rod, initial=initial, duration=duration, rolling=rolling, closed=True, name="breathing ring")

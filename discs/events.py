@@ -22,6 +22,11 @@ class Line:
     """A contact point reaches the straight line through `point` with the normal vector `normal`: normal . (r - point) = 0.
 
     disc : number of the disc; None is the one that is farthest along the normal.
+    terminal, direction : whether it ends the run, and which crossings count, see `discs.events`.
+
+    Raises
+    ------
+    ValueError : unless point and normal are two finite numbers each, the normal other than zero.
     """
 
     point: tuple[float, float]
@@ -46,6 +51,13 @@ class Touch:
 
     Both discs are symmetric about the plane z = R and convex, so they are nearest to each other there, where each is a diameter of
     length 2R along J d_1. The event is the distance of these two segments less the gap.
+
+    one, other : numbers of the discs.
+    terminal, direction : whether it ends the run, and which crossings count, see `discs.events`.
+
+    Raises
+    ------
+    ValueError : for a gap that is not positive, or one disc twice; in a run, for discs of different radii.
     """
 
     one: int
@@ -91,6 +103,11 @@ class FrictionExceeded:
     """A disc needs a friction coefficient |lambda|/N above `mu` to keep rolling; `weight` is N, as for `discs.friction_needed`.
 
     disc : number of the disc; None is the first one of all. (The discs at free ends need more the more discs there are.)
+    terminal, direction : whether it ends the run, and which crossings count, see `discs.events`.
+
+    Raises
+    ------
+    ValueError : unless mu and the weights are positive.
     """
 
     mu: float

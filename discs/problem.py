@@ -29,6 +29,10 @@ class State:
     omega : rates of roll, (n,), rad per time; a number holds for all discs.
     phi : own headings, (n,), rad, for a `SteeredChain`; None for a `Chain`.
     phi_rate : rates of turning, (n,), rad per time; a number holds for all discs.
+
+    Raises
+    ------
+    ValueError : for arrays of different lengths, and for what is not a finite number.
     """
 
     x: ArrayLike
@@ -221,7 +225,12 @@ class Problem:
         )
 
     def energy(self, state: State | None = None) -> float:
-        """Kinetic and potential energy of a state, the initial one by default; potentials of loads are part of it."""
+        """Kinetic and potential energy of a `state` of this chain, by default the initial one; potentials of loads are part of it.
+
+        Raises
+        ------
+        ValueError : for a state that does not fit the chain, as for a `Problem`.
+        """
         if state is None:
             return self._energy
         loads = tuple(load for load in self.loads if not isinstance(load, Motor))  # they have no energy, but a rate at t = 0

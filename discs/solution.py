@@ -39,7 +39,7 @@ class Result:
         raise NotImplementedError
 
     def plot(self, *panels: str, ax: "Axes | Iterable[Axes] | None" = None) -> "list[Axes]":
-        """Plot standard panels, all or those named; see `discs.pictures.figures.first_look`."""
+        """Plot standard `panels`, all or those named, in new axes or in `ax`; see `discs.pictures.figures.first_look`."""
         from discs.pictures import figures
 
         return figures.first_look(self, panels, ax)
@@ -291,7 +291,10 @@ class Solution(Result):
         return State(self.x[i], self.y[i], self.theta[i], self.omega[i], self.phi[i], self.phi_rate[i])
 
     def plot_motion(self, ax: "Axes | None" = None, **style: Any) -> "Axes":
-        """Plot the centre line and the discs from above at several times; see `discs.pictures.figures.motion`."""
+        """Plot the centre line and the discs from above at several times, in new axes or in `ax`.
+
+        `style` are the options of `discs.pictures.figures.motion`.
+        """
         from discs.pictures import figures
 
         return figures.motion(self, ax, **style)

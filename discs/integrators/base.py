@@ -28,6 +28,10 @@ class Integrator(ABC):
     takes_motors, damps : whether it takes discs whose rate is given, and whether it damps oscillations that steps do not resolve.
     adaptive : whether it chooses its own steps; below, h is then the longest step. runs_whole : whether it has `whole`.
     back : longest substep back in time, over h.
+
+    Its methods have these arguments: `system`, the equations of motion of the chain; `z`, a state; `memory`, what the method
+    remembers from step to step, the state itself for one-step methods; `t`, the time of that state; `h`, the step; `work`, counters
+    to which the cost is added; `chain`, `system.parameters` for the compiled form, None for the plain one.
     """
 
     name: ClassVar[str]
@@ -56,10 +60,7 @@ class Integrator(ABC):
 
     @abstractmethod
     def begin(self, system: RollingDiscs, z: Phase, h: float, work: Work, chain: Parameters = None) -> Memory:
-        """The memory of the method at t = 0, for steps of size h.
-
-        `chain`, here and below: `system.parameters` for the compiled form, None for the plain form.
-        """
+        """The memory of the method at t = 0, where the state is z, for steps of size h."""
 
     @abstractmethod
     def advance(self, system: RollingDiscs, memory: Memory, t: float, h: float, work: Work) -> Memory:
@@ -81,12 +82,12 @@ class Integrator(ABC):
 
     @abstractmethod
     def recall(self, memory: Memory, kept: dict[str, Any]) -> Memory:
-        """The memory from what `keep` returned; `memory` is that of `begin` for the same run."""
+        """The memory from `kept`, what `keep` returned; `memory` is that of `begin` for the same run."""
 
     def whole(self, system: RollingDiscs, chain: Parameters, z: Phase, h: float, bound: float, album: Any) -> Work | None:
         """All frames of an `album` (`discs.running.album.Album`) from the state z at once, by steps of at most h; without loads.
 
-        None if it cannot, or if the run fails; it then goes step by step.
+        None if it cannot, or if the run fails or its kinetic energy exceeds `bound`; it then goes step by step.
         """
         return None
 
@@ -116,8 +117,7 @@ class FixedStep(Integrator):
 
     Attributes
     ----------
-    parameters : the NamedTuple of the compiled twin, whose type `step` of `discs.kernels.protocol` is filled in for. None if there
-        is none: runs then take the plain form.
+    in_lanes : whether the compiled twin takes chains in lanes (`discs.kernels.lanes`).
     """
 
     adaptive: ClassVar[bool] = False
@@ -125,6 +125,10 @@ class FixedStep(Integrator):
 
     @property
     def parameters(self) -> Parameters:
+        """The NamedTuple of the compiled twin, whose type `step` of `discs.kernels.protocol` is filled in for.
+
+        None if there is none: runs then take the plain form.
+        """
         return None
 
     @final

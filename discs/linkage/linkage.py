@@ -160,9 +160,21 @@ def _settled(name: str, value: ArrayLike, size: int, least: float | None = None,
 
 @dataclass(frozen=True, eq=False)
 class LinkageState:
-    """Places and velocities of the nodes, numbers or arrays (n,): x, y, phi (the axle), roll theta, and the rates of x, y, phi.
+    """Places, directions and velocities of the nodes, numbers or arrays (n,).
 
-    Where there is a wheel the velocity must be along it; the rate of theta follows from it.
+    Where there is a wheel the velocity must be along it; the rate of roll follows from it.
+
+    Attributes
+    ----------
+    x, y : places, length.
+    phi : directions of the axles, rad.
+    theta : roll angles, rad.
+    x_rate, y_rate : velocities, length per time.
+    phi_rate : rates of turning, rad per time.
+
+    Raises
+    ------
+    ValueError : for arrays of different lengths, and for what is not a finite number.
     """
 
     x: ArrayLike

@@ -16,10 +16,17 @@ from discs.linkage.linkage import Linkage, LinkageState
 class LinkageProblem:
     """A linkage, its initial state and the time to run.
 
+    Attributes
+    ----------
+    linkage : the nodes and their links.
+    initial : state at t = 0.
+    duration : time to simulate, > 0.
+
     Raises
     ------
-    ValueError : if the state has another number of nodes, is off a rigid link, or moves against a constraint, naming the node or
-        link; if constraints are redundant (a rigid loop), or a velocity that they allow has no inertia, naming its node.
+    ValueError : if the duration is not positive; if the state has another number of nodes, is off a rigid link, or moves against a
+        constraint, naming the node or link; if constraints are redundant (a rigid loop), or a velocity that they allow has no
+        inertia, naming its node.
     """
 
     linkage: Linkage

@@ -221,6 +221,7 @@ class Linear(Load):
 
     @cached_property
     def parameters(self) -> Any:
+        """For the compiled form; None for rest stretch and shear, and for viscosity that has none."""
         if (self.degree == 2 and self.viscosity is not None) or (self.section is not None and self.section.ndim == 2):
             return None
         if self.bends is not None and self.bends.viscosity.any() and not self.bends.chain.link_law.quadratic:
@@ -243,6 +244,7 @@ class Linear(Load):
 
     @property
     def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]
+        """The signal of each drive, with the name of its load."""
         return tuple((drive.signal, drive.name) for drive in self.drives)
 
     def timed(self, times: Float, h: float) -> Any:

@@ -38,7 +38,12 @@ class Potential(OnRod):
         return self.over(chain.w, len(spread(chain, {})))
 
     def over(self, w: Float, rows: int) -> "OwnLoad":
-        """The load at places with the shares w (n,) of the length, for coordinates (rows, n)."""
+        """The load at places with the shares w (n,) of the length, for coordinates (rows, n).
+
+        Raises
+        ------
+        ValueError : if V or gradient is no function.
+        """
         for name in ("V", "gradient"):
             if not callable(given := getattr(self, name)):
                 raise ValueError(f"{name} of Potential must be a function of x and y; got {checks.shown(given)}")
@@ -61,7 +66,7 @@ def for_kernels(make: str, functions: tuple[Any, ...], *options: Any) -> tuple[A
 
 
 class OwnLoad(Load):
-    """A load of functions. w : (n,), shares of the discs."""
+    """A load whose force is a user's function, bound to discs. w : (n,), their shares of the length."""
 
     def __init__(self, of: Any, w: Float, rows: int) -> None:
         self._of, self.w = of, w
@@ -150,7 +155,12 @@ class Custom(OnRod):
         return self.over(chain.w, len(spread(chain, {})))
 
     def over(self, w: Float, rows: int) -> "OwnLoad":
-        """As for `Potential`."""
+        """The load at places with the shares w (n,) of the length, for coordinates (rows, n).
+
+        Raises
+        ------
+        ValueError : if force is no function, or power neither a function nor None.
+        """
         if not callable(self.force) or not (self.power is None or callable(self.power)):
             raise ValueError(f"force and power of Custom must be functions of t, q and v; got {checks.shown(self)}")
         return _Own(self, w, rows)

@@ -17,10 +17,7 @@ Signal = Callable[[float], Any]
 
 
 class Named:
-    """A signal that takes arrays of times.
-
-    breaks : times at which it, or a derivative of it, jumps.
-    """
+    """A signal that takes arrays of times."""
 
     def formula(self, xp: Any = np) -> Callable[[Any], Any]:
         """It as a function of t, in functions of NumPy or of another module `xp` that has them; numba compiles it."""
@@ -28,6 +25,7 @@ class Named:
 
     @property
     def breaks(self) -> tuple[float, ...]:
+        """Times at which it, or a derivative of it, jumps."""
         return ()
 
     def __call__(self, t: ArrayLike) -> Float:
@@ -35,21 +33,22 @@ class Named:
         return found
 
 
-def _settle(signal: Named, *names: str) -> None:
+def _check_numbers(signal: Named, *names: str) -> None:
+    """Store these attributes as floats; ValueError unless they are finite numbers."""
     for name in names:
         object.__setattr__(signal, name, checks.number(f"{name} of {type(signal).__name__}", getattr(signal, name)))
 
 
 @dataclass(frozen=True)
 class sine(Named):
-    """amplitude sin(rate t + phase)."""
+    """amplitude sin(rate t + phase), with the rate in rad per time; ValueError for what is not a finite number."""
 
     amplitude: float
     rate: float
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        _settle(self, "amplitude", "rate", "phase")
+        _check_numbers(self, "amplitude", "rate", "phase")
 
     def formula(self, xp: Any = np) -> Callable[[Any], Any]:
         amplitude, rate, phase = self.amplitude, self.rate, self.phase
@@ -58,13 +57,13 @@ class sine(Named):
 
 @dataclass(frozen=True)
 class ramp(Named):
-    """0 until t0, then a straight line to 1 at t1, then 1."""
+    """0 until t0, then a straight line to 1 at t1, then 1; ValueError unless t0 < t1."""
 
     t0: float
     t1: float
 
     def __post_init__(self) -> None:
-        _settle(self, "t0", "t1")
+        _check_numbers(self, "t0", "t1")
         if not self.t0 < self.t1:
             raise ValueError(f"t0 of {type(self).__name__} must be less than t1; got {self.t0:g} and {self.t1:g}")
 
@@ -93,7 +92,7 @@ class smooth(ramp):
 
 @dataclass(frozen=True)
 class pulse(Named):
-    """1 from t0 until t0 + width, otherwise 0.
+    """1 from t0 until t0 + width, otherwise 0; ValueError unless the width is positive.
 
     Fixed steps see it at the times at which they evaluate forces, so its length is right to about a step.
     """
@@ -102,7 +101,7 @@ class pulse(Named):
     width: float
 
     def __post_init__(self) -> None:
-        _settle(self, "t0", "width")
+        _check_numbers(self, "t0", "width")
         if self.width <= 0:
             raise ValueError(f"width of pulse must be positive; got {self.width:g}")
 
@@ -119,7 +118,7 @@ class pulse(Named):
 class table(Named):
     """Values at given times, straight lines between them; before the first and after the last time the value there.
 
-    t : (m,), increasing. values : (m,).
+    t : (m,), increasing. values : (m,). ValueError for others.
     """
 
     t: ArrayLike
@@ -146,7 +145,7 @@ class table(Named):
 
 @dataclass(frozen=True)
 class steady(Named):
-    """1."""
+    """The signal of a load that has none: 1 at all times."""
 
     def formula(self, xp: Any = np) -> Callable[[Any], Any]:
         return lambda t: 0.0 * t + 1.0
@@ -156,7 +155,10 @@ NAMES: dict[str, type[Named]] = {cls.__name__: cls for cls in (sine, ramp, pulse
 
 
 def check(signal: Signal, duration: float, name: str) -> None:
-    """ValueError unless a signal gives finite numbers at the start and the end of a run, the same ones when it is asked again."""
+    """ValueError unless a signal gives finite numbers at the start and the end of a run, the same ones when it is called again.
+
+    duration : of the run. name : of the load, for messages.
+    """
     times = np.array([0.0, duration])
     first, again = values(signal, times, name), values(signal, times, name)
     if (first != again).any():

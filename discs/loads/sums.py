@@ -58,6 +58,7 @@ class Total(Load):
 
     @cached_property
     def parameters(self) -> Parameters:
+        """For the compiled form; None if one of the loads has none."""
         linear, own = self.linear.parameters, [load for load in self.loads if isinstance(load, OwnLoad)]
         functions = [load.functions for load in own]
         if linear is None or None in functions or any(not isinstance(load, Linear | OwnLoad) for load in self.loads):
@@ -69,6 +70,7 @@ class Total(Load):
 
     @property
     def signals(self) -> tuple[tuple[Signal, str], ...]:  # type: ignore[override]
+        """The signal of each drive, with the name of its load."""
         return self.linear.signals
 
     def timed(self, times: Float, h: float) -> Parameters:

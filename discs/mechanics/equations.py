@@ -51,7 +51,10 @@ from discs.mechanics.saddle import dense
 
 
 class Response(NamedTuple):
-    """Accelerations (m,) and multipliers lambda (c,), the forces of constraint being A^T lambda."""
+    """The answer of a system to its forces at one moment.
+
+    acceleration : (m,), of the coordinates. multipliers : lambda (c,); the forces of constraint are A^T lambda.
+    """
 
     acceleration: Float
     multipliers: Float

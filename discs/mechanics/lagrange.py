@@ -22,8 +22,14 @@ def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSyste
     Symmetries are the motions of the plane (those that a shifted ring allows) and an equal roll of all discs of a piece. A piece is
     a set of discs joined by torsion springs.
 
-    M and A are sparse arrays or, with `dense`, NumPy arrays, which are faster for a few discs. Loads are
-    refused, as they are parts of a run: give the system their forces as `applied`.
+    Parameters
+    ----------
+    problem : the chain and its initial state.
+    dense : M and A are NumPy arrays, which are faster for a few discs; otherwise sparse arrays.
+
+    Raises
+    ------
+    ValueError : for loads, as they are parts of a run: give the system their forces as `applied`.
     """
     if problem.loads:
         raise ValueError(
@@ -95,7 +101,12 @@ def _pieces(problem: Problem) -> Float:
 
 
 def frames(problem: Problem, run: Solution | None = None) -> tuple[Float, Float]:
-    """Coordinates and velocities of a run with want=("velocity",), (F, m); without a run, of the initial state, (m,)."""
+    """Coordinates and velocities of a run with want=("velocity",), (F, m); without a run, of the initial state, (m,).
+
+    Raises
+    ------
+    ValueError : for a run without velocities.
+    """
     system = problem.system
     if run is None:
         z = problem.start()

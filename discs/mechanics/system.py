@@ -110,7 +110,15 @@ class MechanicalSystem(Equations):
     def also(self, rows: ArrayLike, owners: Sequence[str], drive: Drive = 0.0) -> "MechanicalSystem":
         """The system with more constraints, constant rows (k, m) with rows @ v = drive: a disc that is held, a motor.
 
+        Parameters
+        ----------
+        rows : (k, m), coefficients of the m velocities in the k constraints.
+        owners : k names for messages, as "motor of disc 3".
         drive : k numbers, or a function t, q -> k numbers.
+
+        Raises
+        ------
+        ValueError : for arrays of a wrong shape, or what is not a finite number.
         """
         owners = names_of("owners", owners)
         extra = scipy.sparse.csr_array(np.atleast_2d(np.asarray(rows, dtype=float)))

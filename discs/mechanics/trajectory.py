@@ -13,8 +13,13 @@ from discs.solution import Result, Solution
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(Result):
-    """A motion at F times: coordinates, velocities (F, m), multipliers (F, c), energy and largest |A v - b| (F,).
+    """The motion of a mechanical system at F times, with m coordinates and c constraints A v = b.
 
+    Attributes
+    ----------
+    t : (F,), times. q, v : (F, m), coordinates and velocities.
+    multipliers : (F, c), lambda; the forces of constraint are A^T lambda.
+    energy : (F,), kinetic and potential. residual : (F,), largest |A v - b|.
     mu : (F, c), the charges of a vakonomic motion, see `discs.mechanics.vakonomic`; None if it is nonholonomic.
     stats : "method", "rtol" as used, "steps", "evaluations" (of accelerations), "rank_drops" (times at which constraints were
         dependent), and "derivatives": of each formula how they were taken and their largest relative error at the frames.

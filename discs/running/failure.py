@@ -13,7 +13,7 @@ class SimulationError(RuntimeError):
 
     Attributes
     ----------
-    step, time, disc : where it failed.
+    message : what happened, the likely cause and what to do. step, time, disc : where it failed.
     slope : |r'| of a disc that lost its heading, one step before; NaN for other causes.
     """
 

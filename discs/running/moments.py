@@ -46,6 +46,7 @@ class Moment:
     """
 
     def __init__(self, march: March, frame: Frame, t: float) -> None:
+        """The moment t of the run `march`, whose positions and rates are those of `frame`."""
         self._march, self._frame, self.t, self.problem = march, frame, t, march.problem
         self.x_rate, self.y_rate = frame.rate[0], frame.rate[1]
         if (load := march.system.load) is not None and not load.conservative:
@@ -160,8 +161,14 @@ def steps(
 ) -> Iterator[Moment]:
     """The moments of a run, the initial one and that after each step, for those who step by hand; `break` ends it.
 
-    Parameters are those of `simulate`, for methods with fixed steps. A step in Python costs some hundredths of a millisecond more
-    than one within `simulate`.
+    A step in Python costs some hundredths of a millisecond more than one within `simulate`.
+
+    Parameters
+    ----------
+    problem : the chain, its initial state, loads and duration.
+    method : a method with fixed steps, by name or with settings, as for `simulate`.
+    dt : time step; None is `suggest_dt(problem, method)`.
+    engine : as for `simulate`.
 
     Yields
     ------
