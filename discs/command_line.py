@@ -24,7 +24,7 @@ from discs.problem import Problem
 from discs.running.engine import ENGINES
 from discs.running.failure import SimulationError
 from discs.running.frames import WANTS
-from discs.running.step_error import doubts
+from discs.running.stats import doubts
 from discs.simulation import simulate
 from discs.solution import Solution
 

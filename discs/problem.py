@@ -17,6 +17,8 @@ from discs.loads import Linear, OnRod, signals, total
 from discs.loads.motor import Held, Motor
 from discs.skew import Load, Phase
 
+BLOW_UP = 10.0  # a run has blown up if its kinetic energy is so many times the most that the balance of energy allows
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -180,16 +182,15 @@ class Problem:
 
     @cached_property
     def blown_up(self) -> float:
-        """Blow-up threshold of the kinetic energy: ten times the most that the balance of energy allows; infinite without a bound.
+        """Blow-up threshold of the kinetic energy: BLOW_UP times the most that the balance of energy allows; infinite without one.
 
-        V >= 0, so that is the energy, less the least potential of loads. The small constant keeps rounding at rest below it.
+        V >= 0, so that is the energy, less the least potential of loads.
         """
         load, chain = self.system.load, self.chain
         if load is not None and not (load.conservative or load.passive):
             return np.inf
         most = self.energy() if load is None else self.energy() - load.least
-        stiffest = np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)
-        return float(10 * most + 1e-16 * stiffest / chain.length)
+        return float(BLOW_UP * most + rounding_energy(chain))
 
     @property
     def conserves(self) -> bool:
@@ -241,3 +242,8 @@ class Problem:
         z, system = self.start(), self.system
         energy = 0.5 * float(np.vdot(z.pi, z.pi)) + system.potential(system.shape(z.hi, z.lo))
         return energy if system.load is None else energy + system.load.potential(0.0, z.hi + z.lo)
+
+
+def rounding_energy(chain: Chain | SteeredChain) -> float:
+    """An energy that rounding may give discs at rest, far below that of any motion; part of the blow-up threshold."""
+    return float(1e-16 * (np.max(chain.torsion_stiffness) + np.max(chain.bending_stiffness)) / chain.length)

@@ -12,10 +12,9 @@ import numpy as np
 
 from discs import checks
 from discs.arrays import Float, Int
+from discs.energy_by_kind import energy_by_kind
 from discs.problem import Problem, State
-from discs.running.by_kind import energy_by_kind
-from discs.running.stats import Stats
-from discs.running.step_error import doubts
+from discs.running.stats import Stats, doubts
 
 if TYPE_CHECKING:
     import pandas

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from discs.mechanics import Trajectory
-from discs.running.step_error import doubts
+from discs.running.stats import doubts
 from discs.solution import Result, Solution
 
 

@@ -1,8 +1,8 @@
 """Runs side by side in the lanes of a vector (`discs.kernels.bundle`): eight chains of the same kind and number of discs.
 
 Sweeps of a step go on until every chain of a bundle has converged, so trajectories are those of `simulate` to what the tolerance of
-sweeps leaves: some units in the last place by default. Whatever would need a word - steps that do not converge or are long for the
-motion, a lost heading, blow-up, a drift of energy - is left to `simulate`: the chains of that bundle are then run one by one.
+sweeps leaves: some units in the last place by default. Runs with an error or a warning - steps that do not converge or are long for
+the motion, a lost heading, blow-up, a drift of energy - are left to `simulate`: the chains of that bundle are then run one by one.
 """
 
 import time as clock
@@ -17,11 +17,13 @@ from discs.chains.links import LinearCurvature
 from discs.integrators import FixedStep
 from discs.integrators.work import NO_LOOKS
 from discs.kernels.vectors import LANES
-from discs.problem import Problem
+from discs.problem import BLOW_UP, Problem
 from discs.running.album import all_steps_before
 from discs.running.calls import heed_halt
-from discs.running.cloud import Cloud
+from discs.running.doubt import ENERGY_DRIFT_WARNING
 from discs.running.frames import ROUNDING
+from discs.running.initial_states import InitialStates
+from discs.running.rounding import LOST_DIGITS_WARNING, lost_digits
 from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, estimated
 from discs.running.time_loop import CHUNK
@@ -29,8 +31,6 @@ from discs.running.time_loop import CHUNK
 LEAST = {"consistent": 8}  # discs of a chain in a bundle, whose two ends do not overlap then
 FEWEST = 3  # runs that pay side by side
 MOST = 1024  # discs up to which it pays
-DRIFT = 0.01  # of the energy, relative: more is left to `simulate`, which warns
-DIGITS = 0.1  # of the error that rounding leaves in a sweep, as in `discs.running.rounding`
 
 
 def kind_of(problem: Problem) -> tuple[Any, ...] | None:
@@ -46,7 +46,7 @@ def kind_of(problem: Problem) -> tuple[Any, ...] | None:
 
 
 class Found(NamedTuple):
-    """Runs side by side. done : (B,), those that need no word; the others are undefined. rows : by name, (B, F, ...).
+    """Runs side by side. done : (B,), those without error or warning; the others are undefined. rows : by name, (B, F, ...).
 
     errors : (B,), `step_error`. solves, gradients : (B,), of the bundles. seconds : of all.
     """
@@ -77,24 +77,24 @@ def side_by_side(problems: Sequence[Problem], integrator: FixedStep, h: float, t
     count, last = len(problems), int(steps[-1])
     if not last or h > (1 + ROUNDING) * problems[0].duration:
         return None
-    cloud = Cloud(problems)
+    starts = InitialStates(problems)
     padded = np.minimum(np.arange(-(-count // LANES) * LANES), count - 1).reshape(-1, LANES)
-    q, bounds, names = cloud.q, cloud.bounds, cloud.rows
+    q, bounds, names = starts.q, starts.bounds, starts.rows
     n, rows, frames = q.shape[2], q.shape[1], times.size
 
     def laned(values: Float) -> Float:
         """(B, rows, n) as (bundles, rows, n LANES)."""
         return np.ascontiguousarray(values[padded].transpose(0, 2, 3, 1)).reshape(len(padded), values.shape[1], -1)
 
-    hi, momenta, work = laned(q), laned(cloud.momenta), np.zeros((len(padded), 2), int)
+    hi, momenta, work = laned(q), laned(starts.momenta), np.zeros((len(padded), 2), int)
     size, clean, watch = n * LANES, np.zeros(len(padded), bool), Watch(last, rows, n)
     if not checked:
         watch.looks = watch.looks[:0]
     defects = np.zeros((len(padded), watch.looks.size, 2, rows * LANES))
-    shown, rates = np.empty((len(padded), rows, frames, size)), np.empty((len(padded), rows - 2, frames, size))
-    told, lo = np.empty((len(padded), 2 * LANES, frames)), np.zeros_like(hi[0])
-    for m, bundle in enumerate(bundles(cloud.parameters, cloud.chains[padded], bounds[padded])):
-        stops = steps, rests, shown[m], rates[m], told[m]
+    recorded, rates = np.empty((len(padded), rows, frames, size)), np.empty((len(padded), rows - 2, frames, size))
+    energy_slip, lo = np.empty((len(padded), 2 * LANES, frames)), np.zeros_like(hi[0])
+    for m, bundle in enumerate(bundles(starts.parameters, starts.chains[padded], bounds[padded])):
+        stops = steps, rests, recorded[m], rates[m], energy_slip[m]
         clean[m] = advance(integrator, bundle, Phases(hi[m], lo.copy(), momenta[m]), h, watch, defects[m], stops, work[m])
     looked = defects.reshape(len(padded), watch.looks.size, 2, rows, LANES)
     errors = np.array([estimated(seen, last) for seen in looked]).ravel()[:count] if checked else np.zeros(count)
@@ -104,13 +104,14 @@ def side_by_side(problems: Sequence[Problem], integrator: FixedStep, h: float, t
         each: Float = values.reshape(len(padded), frames, n, LANES).transpose(0, 3, 1, 2).reshape(-1, frames, n)[:count]
         return each
 
-    found = {name: by_chain(shown[:, row]) for row, name in enumerate(names)}
-    found |= {name: by_chain(rates[:, row]) for row, name in enumerate(cloud.rates)}
-    energies = told.reshape(len(padded), 2, LANES, frames).swapaxes(1, 2).reshape(-1, 2, frames)[:count]
+    found = {name: by_chain(recorded[:, row]) for row, name in enumerate(names)}
+    found |= {name: by_chain(rates[:, row]) for row, name in enumerate(starts.rates)}
+    energies = energy_slip.reshape(len(padded), 2, LANES, frames).swapaxes(1, 2).reshape(-1, 2, frames)[:count]
     found |= {"energy": energies[:, 0], "rolling_residual": energies[:, 1]}
-    fit = np.repeat(clean, LANES)[:count] & (errors <= SUSPECTED[0]) & (1.1e-16 * h * h * cloud.stiffest <= DIGITS)
+    fit = np.repeat(clean, LANES)[:count] & (errors <= SUSPECTED[0]) & (lost_digits(h, starts.stiffest) <= LOST_DIGITS_WARNING)
     if checked:
-        fit &= np.abs(found["energy"] - cloud.energy[:, None]).max(axis=1) <= DRIFT * bounds / 10
+        drift = np.abs(found["energy"] - starts.energy[:, None]).max(axis=1)
+        fit &= drift <= ENERGY_DRIFT_WARNING * bounds / BLOW_UP
     gradients, solves = np.repeat(work, LANES, axis=0)[:count].T
     return Found(fit, found, errors, solves, gradients, last, clock.perf_counter() - begun)
 
@@ -118,7 +119,7 @@ def side_by_side(problems: Sequence[Problem], integrator: FixedStep, h: float, t
 def advance(
     integrator: FixedStep, bundle: Any, state: Any, h: float, watch: Watch, defects: Float, stops: tuple[Any, ...], work: Float
 ) -> bool:
-    """Take all steps of a bundle, and its frames; returns whether no step needs a word.
+    """Take all steps of a bundle, and its frames; returns whether all steps converged and none failed.
 
     watch : the steps to be looked at. defects : of each look, (m, 2, rows LANES), filled in. stops : steps before frames, rests and
     arrays of frames, as for compiled steps. work : (2,), gradients and solves, are added.

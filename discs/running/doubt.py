@@ -4,12 +4,13 @@ import numpy as np
 
 from discs.arrays import Float
 from discs.integrators import METHODS
-from discs.problem import Problem
+from discs.problem import BLOW_UP, Problem
 from discs.running.frames import steps_before
-from discs.running.step_error import WARNED, cure, doubts
+from discs.running.stats import STEP_ERROR_WARNING, Stats, doubts
 from discs.solution import Solution
 
 ENERGY_DRIFT_WARNING = 0.01  # relative
+AIM = 1e-3  # relative error for which a warning suggests a step
 
 
 def doubted(problem: Problem, run: Solution) -> str:
@@ -17,11 +18,19 @@ def doubted(problem: Problem, run: Solution) -> str:
     method = run.stats["method"]
     said = lost_energy(problem, method, run.t, run.energy, run) if run.balance is None else lost_balance(problem, method, run)
     stats = run.stats
-    doubtful = stats.get("unconverged") or stats.get("step_error", 0.0) > WARNED  # first, as it is cheap and most runs pass
+    doubtful = (
+        stats.get("unconverged") or stats.get("step_error", 0.0) > STEP_ERROR_WARNING
+    )  # first, as it is cheap and most runs pass
     if doubtful and (reasons := doubts(stats)):
-        joint, cured = "; and " if said else "", cure(run.stats)
-        said += f"{joint}{method}: {'; '.join(reasons)}: the run may not be trusted; take {cured}, or tol=1e-3"
+        joint = "; and " if said else ""
+        said += f"{joint}{method}: {'; '.join(reasons)}: the run may not be trusted; take {_shorter(stats)}, or tol=1e-3"
     return said
+
+
+def _shorter(stats: Stats) -> str:
+    """A suggested dt, in words: with it steps converge, and the error is AIM if it goes like the square of dt."""
+    shorter: float = stats["dt"] * np.sqrt(min(AIM / (stats.get("step_error") or AIM), 1.0))
+    return f"dt = {min(shorter, stats.get('converging_dt', np.inf)):.2g}"
 
 
 def lost_balance(problem: Problem, method: str, run: Solution) -> str:
@@ -56,7 +65,7 @@ def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Sol
     without that of loads.
     """
     off = np.abs(energy - problem.energy())
-    worst, most, load = int(off.argmax()), problem.blown_up / 10, problem.system.load
+    worst, most, load = int(off.argmax()), problem.blown_up / BLOW_UP, problem.system.load
     if load is not None and load.conservative and most == np.inf and run is not None:
         paths = np.stack([getattr(run, row) for row in problem.system.rows], axis=1)
         most = max(float(e) - load.potential(time, q) for time, e, q in zip(t, energy, paths, strict=True))

@@ -1,23 +1,33 @@
 """Warnings before a run: where rounding stops the convergence of implicit steps, and where substeps back in time amplify."""
 
+from typing import Any
+
 import numpy as np
 
+from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.problem import Problem
 from discs.warn import warn
 
+LOST_DIGITS_WARNING = 0.1  # of the error of a sweep that rounding leaves
+
+
+def lost_digits(h: float, stiffest: Float | float) -> Any:
+    """The part of its error that a sweep of a step h leaves, due to rounding in the solve with I + h^2/4 C^T S C.
+
+    It is the largest entry of the matrix, h^2 `stiffest`, times the unit of rounding, 1.1e-16. Sweeps do not converge where it is
+    near one.
+    """
+    return 1.1e-16 * h * h * stiffest
+
 
 def warn_of_lost_digits(system: RollingDiscs, h: float) -> None:
-    """Warn where rounding in solves with I + h^2/4 C^T S C stops the convergence of sweeps.
-
-    A sweep multiplies the remaining error by the largest entry, h^2 `stiffest`, times the unit of rounding, 1.1e-16. Sweeps do not
-    converge where this factor is near one.
-    """
-    lost = 1.1e-16 * h * h * system.stiffest
-    if lost > 0.1:
+    """Warn where rounding stops the convergence of sweeps."""
+    lost = lost_digits(h, system.stiffest)
+    if lost > LOST_DIGITS_WARNING:
         warn(
             f"{system.n} discs at dt = {h:g}: each sweep of a step leaves {lost:.1g} of its error, due to rounding, and the run "
-            f"may not be trusted; take dt below {h * np.sqrt(0.1 / lost):.1g}, or fewer discs"
+            f"may not be trusted; take dt below {h * np.sqrt(LOST_DIGITS_WARNING / lost):.1g}, or fewer discs"
         )
 
 

@@ -5,6 +5,8 @@ from typing import Any, TypedDict, cast
 
 from discs.integrators import Integrator
 
+STEP_ERROR_WARNING = 0.05  # relative `step_error` above which a run may not be trusted
+
 
 class Stats(TypedDict, total=False):
     """`Solution.stats`, a dictionary: settings, cost and error estimates. A solver fills in the entries that it knows.
@@ -62,6 +64,24 @@ def begun(integrator: Integrator, because: str, want: Sequence[str], dt: float, 
         "dt_suggested": suggested,
     }
     return found | (Stats(plain_because=because) if because else {})
+
+
+def doubts(stats: Stats) -> list[str]:
+    """Reasons not to trust a run, in words, from its stats."""
+    found = []
+    if stats.get("unconverged") and (stuck := _number(stats["unconverged"])):
+        steps = _number(stats.get("steps")) + _number(stats.get("short_steps"))
+        found.append(f"{stuck} of {steps} steps did not converge")
+    error = stats.get("step_error")
+    if isinstance(error, float) and error > STEP_ERROR_WARNING:
+        off = f"by about {100 * error:.0f} %" if error < 1 else "by 100 % or more"
+        found.append(f"dt = {_number(stats.get('dt')):.3g} is too long for this motion, positions or angles may be off {off}")
+    return found
+
+
+def _number(value: object) -> float:
+    """A value of stats if it is a number, otherwise 0: a file may hold anything."""
+    return value if isinstance(value, int | float) else 0
 
 
 def of_search(stats: Stats) -> Stats:

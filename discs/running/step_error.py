@@ -23,7 +23,6 @@ from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.base import FixedStep
 from discs.integrators.work import Looks, Memory, Tally, Work
 from discs.kernels.limits import TURNED
-from discs.running.stats import Stats
 from discs.skew import Parameters, Phase
 
 EVERY = 50  # steps per look
@@ -33,9 +32,7 @@ SAFETY = 2.0  # factor of the estimate
 DOUBTFUL = 0.01  # relative estimate above which a step is compared
 SUSPECTED = 0.02, 1.0  # relative estimates between which a run is computed again ...
 SHORT = 200_000  # ... if steps times discs are at most this: some hundredths of a second
-WARNED = 0.05  # relative estimate above which a run warns
 LEAST = 1e-10  # of the largest position or angle: a row of smaller ones is rounding
-AIM = 1e-3  # relative error for which a warning suggests a step
 HALVINGS = 8  # of a step that did not converge, at most
 
 
@@ -166,27 +163,3 @@ def converging(
             break
     shorter: float = h / 2**halving
     return shorter
-
-
-def doubts(stats: Stats) -> list[str]:
-    """Reasons not to trust a run, in words, from its stats."""
-    found = []
-    if stats.get("unconverged") and (stuck := _number(stats["unconverged"])):
-        steps = _number(stats.get("steps")) + _number(stats.get("short_steps"))
-        found.append(f"{stuck} of {steps} steps did not converge")
-    error = stats.get("step_error")
-    if isinstance(error, float) and error > WARNED:
-        off = f"by about {100 * error:.0f} %" if error < 1 else "by 100 % or more"
-        found.append(f"dt = {_number(stats.get('dt')):.3g} is too long for this motion, positions or angles may be off {off}")
-    return found
-
-
-def cure(stats: Stats) -> str:
-    """A suggested dt, in words: with it steps converge, and the error is AIM if it goes like the square of dt."""
-    shorter: float = stats["dt"] * np.sqrt(min(AIM / (stats.get("step_error") or AIM), 1.0))
-    return f"dt = {min(shorter, stats.get('converging_dt', np.inf)):.2g}"
-
-
-def _number(value: object) -> float:
-    """A value of stats if it is a number, otherwise 0: a file may hold anything."""
-    return value if isinstance(value, int | float) else 0

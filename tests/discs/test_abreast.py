@@ -190,7 +190,7 @@ def test_calls_of_few_steps_make_the_same_bits(kernels_as_python, monkeypatch):
 def test_the_initial_state_is_that_of_a_problem():
     for model in SLAVED + STEERED:
         problems = cloud(5, 9, model)
-        found = running.Cloud([problems[2], *problems])
+        found = running.InitialStates([problems[2], *problems])
         for i, problem in enumerate(problems, 1):
             np.testing.assert_allclose(found.momenta[i], np.atleast_2d(problem.start().pi), rtol=4e-16)
             assert found.energy[i] == pytest.approx(problem.energy(), rel=1e-14)

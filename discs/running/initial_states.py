@@ -8,17 +8,17 @@ import numpy as np
 from discs.arrays import Float
 from discs.chains import stencils
 from discs.chains.chain import Chain, SteeredChain
-from discs.problem import Problem
+from discs.problem import BLOW_UP, Problem, rounding_energy
 
-Each = Callable[[Sequence[Any]], Float]  # values of the chains that differ -> those of all, (B, ...)
+Each = Callable[[Sequence[Any]], Float]  # values of the distinct chains -> those of all problems, (B, ...)
 
 
-class Cloud:
-    """Chains of one kind.
+class InitialStates:
+    """The initial states of B problems whose chains are of one kind.
 
     Attributes
     ----------
-    parameters : of the chains that differ. chains : (B,), the number of each problem's chain in them.
+    parameters : of the distinct chains. chains : (B,), the number of each problem's chain among these.
     rows, rates : the names of positions, and of the rates from theta on.
     q : (B, rows, n), initial positions. momenta : (B, columns, n). energy : (B,), at the start. bounds : (B,), as
         `Problem.blown_up`. stiffest : (B,), as in the systems.
@@ -52,8 +52,7 @@ class Cloud:
             roots, twice = _slaved(self.parameters, chains[0], links, each)
         self.momenta = roots * rates
         self.energy = 0.5 * ((self.momenta**2).sum(axis=(1, 2)) + twice)
-        rounding = [1e-16 * (np.max(c.torsion_stiffness) + np.max(c.bending_stiffness)) / c.length for c in chains]
-        self.bounds = 10 * self.energy + each(rounding)
+        self.bounds = BLOW_UP * self.energy + each([rounding_energy(chain) for chain in chains])
         self.stiffest = each([system.stiffest for system in systems])
 
 
