@@ -1,4 +1,4 @@
-"""Motions of elements in time, by SciPy's methods with control of the error of steps."""
+"""Motions of elements in time, by SciPy's methods with control of the error of steps; without loads `continuum.element_whole`."""
 
 from collections.abc import Callable
 from functools import partial
@@ -12,6 +12,7 @@ from discs.arrays import Float, Matrix
 
 MOST_CALLS = 12 * 2**17  # evaluations of the rates, twelve per step of DOP853
 TRIED = 12 * 2**8  # evaluations after which their total is predicted
+RTOL = 1e-12  # relative tolerance of the steps
 INSIDE = 1e-12  # of the duration: signals are evaluated this far from their jumps, on the side of the step
 
 
@@ -35,12 +36,10 @@ def march(
         nonlocal calls
         calls += 1
         if calls > MOST_CALLS or (calls == TRIED and pattern is None and t * MOST_CALLS < TRIED * end):
-            raise ValueError(
-                f"tol is not reached in {MOST_CALLS // 12} time steps of {what}: ask for a larger tol or a shorter duration"
-            )
+            raise too_many(what)
         return rate(t, y)
 
-    options: dict[str, Any] = {"rtol": 1e-12, "atol": tol}
+    options: dict[str, Any] = {"rtol": RTOL, "atol": tol}
     method = scipy.integrate.DOP853 if pattern is None else partial(scipy.integrate.Radau, jac_sparsity=pattern)
     found = [start] * int(np.count_nonzero(times <= 0))
     for a, b in pairwise(edges):
@@ -71,4 +70,14 @@ def march(
 def step(solver: Any) -> None:
     message = solver.step()
     if solver.status == "failed":
-        raise ValueError(f"the field could not be integrated: {message}; ask for a larger tol or a shorter duration")
+        raise failed(message)
+
+
+def too_many(what: str) -> ValueError:
+    """The error for a motion of a system, in words, that takes more than MOST_CALLS evaluations."""
+    return ValueError(f"tol is not reached in {MOST_CALLS // 12} time steps of {what}: ask for a larger tol or a shorter duration")
+
+
+def failed(message: str) -> ValueError:
+    """The error for steps that fail."""
+    return ValueError(f"the field could not be integrated: {message}; ask for a larger tol or a shorter duration")

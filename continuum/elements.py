@@ -20,7 +20,6 @@ where damping is stiff, with an error far below that of the elements. Loads: see
 The method is independent of the chain of discs: it shares only the equations.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -31,7 +30,8 @@ import scipy  # its parts, slow to import, when they are used
 from continuum.element_grid import Grid
 from continuum.element_loads import ElementLoads, breaks
 from continuum.element_march import march
-from continuum.element_rates import compiled, ready
+from continuum.element_whole import march as whole
+from continuum.element_whole import parameters, ready
 from continuum.initial import resolve
 from continuum.parameters import Section, sample
 from continuum.pieces import POINTS
@@ -76,11 +76,12 @@ class Elements:
         return self.grid.s
 
     def local(self, q: Float) -> Float:
-        """Rows x, y, theta, phi on elements, (4, P, DEGREE + 1); the last node of a closed rod includes its shift and turns."""
-        values = q[:4, self.grid.index]
+        """Rows x, y, theta, phi of (6, ..., n) on elements, (4, ..., P, DEGREE + 1); the last node of a closed rod is shifted and
+        turned."""
+        values: Float = q[:4, ..., self.grid.index]
         if self.scene.closed:
-            values[:2, -1, -1] += np.array(self.scene.shift)
-            values[3, -1, -1] += 2 * np.pi * self.scene.turns
+            for row, added in zip((0, 1, 3), (*self.scene.shift, 2 * np.pi * self.scene.turns), strict=True):
+                values[row, ..., -1, -1] += added
         return values
 
     def _strains(self, q: Float) -> tuple[Float, Float, Float, Float]:
@@ -180,12 +181,6 @@ class Elements:
         power[0] -= torque[loads.driven] @ q[4:][loads.driven]
         return np.concatenate([out.ravel(), power])
 
-    @cached_property
-    def compiled(self) -> Callable[[float, Float], Float]:
-        """The compiled twin of `rate`, without loads."""
-        closing = np.array([*self.scene.shift, 0.0, 2 * np.pi * self.scene.turns]) if self.scene.closed else np.zeros(4)
-        return compiled(self.grid, self.stiffness, self.radius, self.inertia, closing)
-
     def _balance(self, times: Float, q: Float, values: Float, spent: Float) -> tuple[Float, Float | None]:
         """Work and dissipation (F, 2), and torques of motors (F, motors), of a motion (F, 6, n) with signals (F, L + motors + 1).
 
@@ -232,15 +227,20 @@ class Elements:
         return off
 
     def sample(self, q: Float, s: Float) -> Float:
-        """Rows x, y, theta, phi, theta., phi. of (6, n) at places s (S,), (6, S)."""
-        return self.grid.sample(np.concatenate([self.local(q), q[4:, self.grid.index]]), s)
+        """Rows x, y, theta, phi, theta., phi. of (6, ..., n) at places s (S,), (6, ..., S)."""
+        return self.grid.sample(np.concatenate([self.local(q), q[4:, ..., self.grid.index]]), s)
 
     def run(self, times: Float, tol: float) -> "Course":
         """The motion at the times, with an error of the time steps below tol."""
         loads, start, size = self.loads, self.start.ravel(), 6 * self.n
         what = f"{self.grid.count} elements"
         if loads is None:
-            q = march(self.compiled if ready() else self.rate, start, times, np.zeros(1), tol, what).reshape(-1, 6, self.n)
+            if ready():
+                closing = np.array([*self.scene.shift, 0.0, 2 * np.pi * self.scene.turns]) if self.scene.closed else np.zeros(4)
+                rod = parameters(self.grid, self.stiffness, self.radius, self.inertia, closing)
+                q = whole(rod, self.start, times, tol, what)
+            else:
+                q = march(self.rate, start, times, np.zeros(1), tol, what).reshape(-1, 6, self.n)
             return Course(q, np.array([self.energy(z) for z in q]))
         fastest = loads.fastest(self.inertia, float(np.max(self._at_nodes.radius)))
         # explicit steps are below 5/fastest; the number of implicit ones, which cost more, grows like tol^(-1/5)

@@ -38,7 +38,7 @@ class Found(NamedTuple):
 
     def sample(self, s: Float, times: Float, want: tuple[str, ...]) -> dict[str, Float]:
         """The unknowns (F, S) at places s (S,), by name, and wanted quantities."""
-        values = np.stack([self.elements.sample(q, s) for q in self.course.q], axis=1)
+        values = self.elements.sample(self.course.q.swapaxes(0, 1), s)
         found = dict(zip(UNKNOWNS, values, strict=True))
         if want:
             ground = ElementGround(self.elements, s, want)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discs.kernels import protocol as do
-from discs.kernels.compiled import kernel, part
+from discs.kernels.compiled import fill, kernel, part, stub
 from discs.kernels.interrupts import interrupted
 from discs.kernels.shared import columns, copy, forward
 from discs.skew import Phase
@@ -79,24 +79,11 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
     while done < times.size:
         if interrupted(now.q.size):
             return -1, taken, evaluations
-        least, rejected = 10 * (np.nextafter(t, np.inf) - t), False
-        h = min(max(h, least), longest)
-        while True:
-            if not h >= least:
-                return done, taken, evaluations
-            end = t + h
-            h = end - t
-            for stage in range(1, STAGES):
-                combine(method.a[stage], stage, k, h, now, inside)
-                rate(chain, work, t + method.c[stage] * h, inside, c, still, k, stage)
-            combine(method.b, STAGES, k, h, now, then)
-            rate(chain, work, end, then, c, still, k, STAGES)
-            evaluations += STAGES
-            error = norm(method, k, h, now, then, rtol, atol)
-            if error < 1:
-                break
-            h, rejected = h * max(LEAST, SAFETY * error ** (-1 / 8)), True
-        factor = MOST if error == 0 else min(MOST, SAFETY * error ** (-1 / 8))
+        end, longer, more = step(method, chain, work, t, np.inf, h, longest, k, now, inside, then, c, still, rtol, atol)
+        evaluations += more
+        if end == t:
+            return done, taken, evaluations
+        h = end - t
         kinetic = 0.0
         for row in range(then.p.shape[0]):
             for i in range(n):
@@ -122,13 +109,45 @@ def run(method, chain, state, rtol, atol, longest, bound, times, q, rates, told)
         t, now, then, taken = end, then, now, taken + 1
         copy(k.q[STAGES], k.q[0])
         copy(k.p[STAGES], k.p[0])
-        h *= min(1.0, factor) if rejected else factor
+        h = longer
     return done, taken, evaluations
 
 
 @part
+def step(method, chain, work, t, last, h, longest, k, now, inside, then, c, still, rtol, atol):
+    """A step from the state `now` at t to `then`, not beyond a time `last`. k[0] holds the rates before it, k[STAGES] those after.
+
+    Returns its end, which is t if it became too short; the length that the next one is to have; and the number of evaluations.
+    """
+    least, rejected, evaluations = 10 * (np.nextafter(t, np.inf) - t), False, 0
+    h = min(max(h, least), longest)
+    while True:
+        if not h >= least:
+            return t, h, evaluations
+        end = min(t + h, last)
+        h = end - t
+        for stage in range(1, STAGES):
+            combine(method.a[stage], stage, k, h, now, inside)
+            rate(chain, work, t + method.c[stage] * h, inside, c, still, k, stage)
+        combine(method.b, STAGES, k, h, now, then)
+        rate(chain, work, end, then, c, still, k, STAGES)
+        evaluations += STAGES
+        error = norm(method, k, h, now, then, rtol, atol)
+        if error < 1:
+            break
+        h, rejected = h * max(LEAST, SAFETY * error ** (-1 / 8)), True
+    factor = MOST if error == 0 else min(MOST, SAFETY * error ** (-1 / 8))
+    return end, h * (min(1.0, factor) if rejected else factor), evaluations
+
+
+@stub
 def rate(chain, work, t, z, c, still, k, stage):
-    """k[stage] = the reduced equations at z, which becomes the base position."""
+    """k[stage] = the time derivative at the time t and the state z."""
+
+
+@fill(rate, object)
+def _reduced(chain, work, t, z, c, still, k, stage):
+    """By the reduced equations; z becomes the base position."""
     v, g = k.q[stage], k.p[stage]
     do.settle(chain, work, z.q, still)
     do.basis(chain, work, still, c)
