@@ -2,8 +2,9 @@
 
 A process is started by the first run that finds a kernel missing, and is sent functions to call, one after the other: each calls
 its kernels once, which compiles them into the cache on disc. It outlives the run that started it, until they are all there. Where
-several such processes run, they take turns, so that a kernel is not compiled by each. Worker
-processes wait for their kernels instead, unless `compiling_aside`; so do machines without a cache.
+several such processes run, they take turns, so that a kernel is not compiled by each; one whose run has ended does not wait for its
+turn, as later runs ask again. Worker processes wait for their kernels instead, unless `compiling_aside`; so do machines without a
+cache.
 """
 
 import hashlib
@@ -26,6 +27,7 @@ from discs.kernels.compiled import NotReady, readily, uncached
 ENGINE = "DISCS_ENGINE"  # in the environment: the engine of runs that are given none
 ASIDE = "DISCS_COMPILE_ASIDE"  # in the environment, so that worker processes inherit it; see `compiling_aside`
 SECONDS = 1.0  # between two looks whether kernels are there
+ASKING = os.getppid()  # the process that asks, where this is the one that compiles
 USUAL = [os.environ.get(ENGINE) or "auto"]  # that engine
 
 
@@ -139,18 +141,33 @@ class Kernels:
 
 @contextmanager
 def _turn(name: str) -> Iterator[None]:
-    """Wait for the other processes of this user that compile into the same cache; not at all where files cannot be locked."""
+    """Wait for the other processes of this user that compile into the same cache; not at all where files cannot be locked.
+
+    SystemExit if the process that asked ends meanwhile.
+    """
     cache = os.environ.get("NUMBA_CACHE_DIR", "") + os.fspath(Path(__file__).resolve().parent)
     with ExitStack() as opened:
         with suppress(ImportError, OSError, AttributeError):
-            import fcntl
-
             name = f"rolling-discs-{os.getuid()}-{hashlib.sha256(os.fsencode(cache)).hexdigest()[:12]}-{name}.lock"
             file = Path(tempfile.gettempdir(), name)
             held = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
             opened.callback(os.close, held)
-            fcntl.flock(held, fcntl.LOCK_EX)
+            while not _locked(held):
+                if os.getppid() != ASKING:
+                    raise SystemExit
+                time.sleep(SECONDS / 4)
         yield
+
+
+def _locked(file: int) -> bool:
+    """Lock an open file, if no other process holds it."""
+    import fcntl
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def _serve(turn: str) -> None:

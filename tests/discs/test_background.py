@@ -208,3 +208,13 @@ def test_processes_that_compile_take_turns(monkeypatch, tmp_path):
         order.append("first")
     thread.join(10)
     assert order == ["first", "other"]
+
+
+def test_a_process_whose_run_has_ended_does_not_wait_for_its_turn(monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    with background._turn("soon"):
+        monkeypatch.setattr(background, "ASKING", -1)
+        with pytest.raises(SystemExit), background._turn("soon"):
+            pass
+    with background._turn("soon"):  # nobody is there: it compiles
+        pass
