@@ -1,6 +1,6 @@
 """Help of the commands of `python -m compare`: in a few words, in sentences with the files written, and options of an example."""
 
-COMMANDS = {
+HELP = {
     "lab": (
         "a page to play with: discs that move as you change them",
         "Open the lab in a browser: a live simulation in three dimensions. Choose the scene, the number of discs, the law and the "

@@ -253,7 +253,7 @@ def test_own_scene(tmp_path, monkeypatch, capsys):
     """The scene of the file is what is measured; it takes the place of --scenes."""
     (tmp_path / "mine.toml").write_text('scene = "breathing_ring"\nradius = 0.7\nduration = 0.3\n')
     given = {}
-    monkeypatch.setattr("compare.__main__.wait_for_kernels", lambda: None)
+    monkeypatch.setattr("compare.commands.wait_for_kernels", lambda: None)
     monkeypatch.setattr("compare.precision.work_precision", lambda scenes, *_, into: given.update(scenes))
     monkeypatch.setattr(WorkPrecision, "plot", lambda self, path: path.write_text(""))
     arguments = ["precision", "--scene", str(tmp_path / "mine.toml"), "--quiet", "--out", str(tmp_path / "out")]

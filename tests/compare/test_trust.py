@@ -165,7 +165,7 @@ def test_an_interrupted_run_keeps_what_it_has_found(tmp_path, capsys, monkeypatc
     def interrupted(*args, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("compare.__main__.trust", interrupted)
+    monkeypatch.setattr("compare.commands.trust", interrupted)
     assert main(["trust", "--quiet", "--out", str(out)]) == 130
     assert "the same command continues" in capsys.readouterr().err
     assert (out / "trust.csv").read_text().count("0:7") == 2
