@@ -24,6 +24,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from continuum.galerkin import SpectralRod
+from continuum.gauss import gauss
 from continuum.modes import Modes, Pencil
 from discs.arrays import Float
 from discs.integrators.collocated import Guide, collocate
@@ -113,7 +114,7 @@ def spent(h: float, power: Float, parts: Float) -> Float:
 
 def between(values: Float, parts: Float) -> Float:
     """Values at the stages of a step, (s, m), at fractions `parts` (F,) of it, (F, m): the polynomial through them."""
-    nodes, _ = legendre.leggauss(len(values))
+    nodes, _ = gauss(len(values))
     found: Float = legendre.legvander(2 * parts - 1, len(values) - 1) @ np.linalg.solve(
         legendre.legvander(nodes, len(values) - 1), values
     )
@@ -122,7 +123,7 @@ def between(values: Float, parts: Float) -> Float:
 
 def rolling(h: float, v: Float, part: float) -> Float:
     """omega and omega. at a fraction of a step of length h, (2, n), by the polynomial through omega at its stages."""
-    nodes, _ = legendre.leggauss(len(v))
+    nodes, _ = gauss(len(v))
     series = np.linalg.solve(legendre.legvander(nodes, len(v) - 1), v[:, 2])
     return np.stack([legendre.legval(2 * part - 1, c) for c in (series, 2 / h * legendre.legder(series))])
 
@@ -130,7 +131,7 @@ def rolling(h: float, v: Float, part: float) -> Float:
 @cache
 def _polynomials(stages: int) -> tuple[Float, Float]:
     """Legendre coefficients, (stages + 1, stages), of int_0^tau l_j and of L_j."""
-    nodes, _ = legendre.leggauss(stages)
+    nodes, _ = gauss(stages)
     rates = legendre.legint(np.linalg.inv(legendre.legvander(nodes, stages - 1)), lbnd=-1) / 2
     return rates, np.linalg.inv(legendre.legvander(np.concatenate([[-1.0], nodes]), stages))[:, 1:]
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from continuum.density import Density
 from continuum.element_grid import lobatto
+from continuum.gauss import gauss
 from continuum.parameters import sample
 from continuum.rod import Rod
 from discs.arrays import Float
@@ -72,7 +73,7 @@ def polynomials(n: int, density: Density) -> Functions:
     much higher degree.
     """
     length, modes = density.length, 3 * n + 300 if density.centres else n
-    points, weights = legendre.leggauss(modes + 1)
+    points, weights = gauss(modes + 1)
     stretch = 1 / density.rate(density.place(points))[:, None]  # ds/dxi
     series = (legendre.legvander(points, modes) * weights[:, None]).T * (np.arange(modes + 1) + 0.5)[:, None]
     values = legendre.legvander(points, n - 3)
@@ -105,7 +106,7 @@ def polynomials(n: int, density: Density) -> Functions:
 
     x, w, _ = lobatto(n - 1)
     s = density.place(x)
-    fine, wf = legendre.leggauss(int(np.ceil(FINER * n)))
+    fine, wf = gauss(int(np.ceil(FINER * n)))
     there = density.place(fine)
     rate = density.rate(there)[:, None]
     wf = wf / rate[:, 0]

@@ -32,6 +32,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import legendre
 
+from continuum.gauss import gauss
 from continuum.pieces import ENDS, EXPAND, NODES, POINTS, TINY, WEIGHTS, Cut, Data, split
 from continuum.rod import Scene
 from discs.arrays import Float
@@ -72,7 +73,7 @@ class Resolved:
 
     def quadrature(self, order: int) -> tuple[Float, Float]:
         """Places and weights of Gauss quadrature with `order` points on every piece, each (P order,)."""
-        x, w = legendre.leggauss(order)
+        x, w = gauss(order)
         half = np.diff(self.pieces)[:, None] / 2
         return (self.pieces[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
@@ -85,7 +86,7 @@ class Resolved:
         # from the 16 nodes that resolve it: with more, rounding of the highest coefficients would be amplified
         half = np.diff(edges)[:, None] / 2
         field = self.fields((edges[:-1, None] + half * (1 + NODES)).ravel())[name].reshape(-1, POINTS) @ EXPAND.T
-        places = legendre.legvander(legendre.leggauss(order)[0], POINTS - 1 - m)
+        places = legendre.legvander(gauss(order)[0], POINTS - 1 - m)
         found: Float = (field @ legendre.legder(np.eye(POINTS), m).T @ places.T / half**m).ravel()
         return found
 

@@ -98,7 +98,7 @@ def unseen(scene: Scene, problem: Problem) -> str:
     except ValueError as error:
         rough = str(error).startswith(tuple(scene.rod.varying))  # of parameters
         return f"{'more discs converge slowly' if rough else 'the discs have no limit as a field'}: {error}"
-    problem = replace(problem, loads=())
+    problem = replace(problem, loads=()) if problem.loads else problem
     pi = problem.start().pi
     parts = {"potential energy": (abs(found.potential - problem.energy() + 0.5 * float(np.vdot(pi, pi))), found.potential)}
     s, w = found.quadrature(POINTS)

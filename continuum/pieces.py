@@ -8,6 +8,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
+from continuum.gauss import gauss
 from continuum.parameters import sample
 from continuum.rod import Scene
 from discs.arrays import Bool, Float, Int
@@ -22,7 +23,7 @@ MOST = 4096  # pieces bisected at once
 EPS = np.finfo(float).eps
 PLACE, WHOLE = {"s": "place", "t": "time"}, {"s": "length", "t": "duration"}  # words for messages
 
-NODES, WEIGHTS = legendre.leggauss(POINTS)
+NODES, WEIGHTS = gauss(POINTS)
 _OTHERS = 2 * np.modf(0.5 + np.arange(1, 9) * (5**0.5 - 1) / 2)[0] - 1
 _BOTH = np.concatenate([NODES, _OTHERS])
 EXPAND = (legendre.legvander(NODES, POINTS - 1) * WEIGHTS[:, None]).T * (np.arange(POINTS) + 0.5)[:, None]

@@ -30,6 +30,7 @@ from numpy.polynomial import legendre
 from continuum import collocation, driven_ends
 from continuum.end_identities import EndIdentities
 from continuum.galerkin import SpectralRod
+from continuum.gauss import gauss
 from continuum.modes import Modes, Pencil
 from discs import SimulationError
 from discs.arrays import Complex, Float
@@ -110,7 +111,7 @@ class Steps:
         self.rod, self._duration, self._tolerance, self._compiled = rod, duration, tolerance, compiled
         self._stages = stages
         self._sweeps = sweeps(tolerance)
-        nodes, _ = legendre.leggauss(self._stages)
+        nodes, _ = gauss(self._stages)
         self._series = np.linalg.inv(legendre.legvander(nodes, self._stages - 1))[-2:]  # rates of stages to last coefficients
         self._next = min(first, LONGEST * rod.crossing)
         self._modes: Modes | Pencil | None = None

@@ -39,10 +39,10 @@ Integrals are sums over Gauss points on pieces on which the initial fields and t
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from continuum.curved import Curved, forces, product
 from continuum.functions import Functions
+from continuum.gauss import gauss
 from continuum.initial import Resolved
 from continuum.kernels.spectral_load import NONE, Load
 from continuum.load_places import cut_patterns, point_loads
@@ -207,7 +207,7 @@ def weak(initial: Resolved, functions: Functions, order: int) -> Weak:
     length, points = scene.rod.length, point_loads(scene)
     cut = cut_patterns(scene)
     edges = initial.pieces if cut is None else np.unique(np.concatenate([initial.pieces, cut.edges]))
-    x, w = legendre.leggauss(order)
+    x, w = gauss(order)
     half = np.diff(edges)[:, None] / 2
     s = np.concatenate([(edges[:-1, None] + half * (1 + x)).ravel(), points])
     terms = Terms(scene, s, np.concatenate([(half * w).ravel(), np.zeros(len(points))]))

@@ -100,12 +100,13 @@ def field(
     given = array(name, value, f"a number or {size} numbers")
     if given.shape not in ((), (size,)):
         raise ValueError(f"{name} must be a number or an array of shape ({size},); got shape {given.shape}")
-    given = np.broadcast_to(given, (size,))
     bad = ~np.isfinite(given)
     need = "finite"
     if least is not None:
         bad |= given <= least if strict else given < least
         need = f"finite and {'greater than' if strict else 'at least'} {least:g}"
+    given = given if given.ndim else np.broadcast_to(given, (size,))
+    given.flags.writeable = False
     if bad.any():
         i = int(np.argmax(bad))
         raise ValueError(f"{name} must be {need}; got {given[i]} at {f'place {i}' if places is None else f's = {places[i]:g}'}")
@@ -159,6 +160,8 @@ def _index(value: Any) -> int | None:
 
 def _doubles(value: ArrayLike) -> Float | str:
     """`value` as a new float array, or the reason why it is none ("" if it is obvious)."""
+    if type(value) is float or (type(value) is np.ndarray and value.dtype == np.float64):  # most are: nothing can be wrong
+        return np.array(value)
     if isinstance(value, TEXTS):
         return ""
     try:
