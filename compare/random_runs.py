@@ -111,7 +111,7 @@ def _judged(problem: Problem, found: Solution, row: Row, seconds: float) -> Row:
 
 def _shown(problem: Problem, error: Exception, seconds: float) -> str:
     """Whether a refusal is justified, in words."""
-    if "rounding is the limit" in str(error):
+    if any(words in str(error) for words in ("rounding is the limit", "can be held until")):
         return "rounding"
     if not isinstance(error, SimulationError) or not error.step:
         return ""

@@ -19,7 +19,9 @@ Input: a problem, tolerances and frames. Output: a run within the tolerances, wi
    place. If they differ by a tenth of the error or more, or if sweeps that converged to rounding may leave as much, rounding is
    the limit, and `NotReached` is raised. For tolerances below FINE, or after LATE runs, this test is made as soon as errors are
    below RESOLVED; if the difference exceeds the tolerance, no step can reach it.
-6. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
+6. A search that has taken long while its errors stay large looks until when the tolerance can be held at all
+   (`discs.running.held`). If that is before the end, `NotReached` names the time.
+7. If a run fails, or its sweeps do not converge, the number of steps is doubled. If a disc loses its heading, the motion itself
    ends there, provided that its |r'| one step before is below ENDED and that two runs in a row lose it at the same time.
 
 The tolerance of sweeps is such that all steps together leave an error of SWEPT times the tolerance
@@ -42,6 +44,7 @@ from discs.running import estimates
 from discs.running.by_dop853 import search_explicit
 from discs.running.estimates import LEAST_ORDER
 from discs.running.failure import NotReached, SimulationError
+from discs.running.held import Looks
 from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
 from discs.solution import Solution
@@ -182,7 +185,7 @@ def search(
     sweeps: dict[float, Integrator] = {}  # the method with its tolerance of sweeps, by the step of a run
     size: dict[str, float] = {}
     failure: SimulationError | None = None
-    looked, stalls, failures, best_yet = False, 0, 0, np.inf
+    looked, stalls, failures, best_yet, looks = False, 0, 0, np.inf, Looks(problem, end)
 
     def told(longer: Solution, shorter: Solution, limit: str) -> Solution:
         """The run with longer steps, with estimates of all its errors."""
@@ -198,6 +201,7 @@ def search(
         try:
             found = yield problem, sharp, dt, some
             failure = None
+            looks.count(found)
         except SimulationError as error:
             if failure and error.slope < ENDED and abs(error.time - failure.time) < 3 * dt:  # the last dt was twice that
                 raise
@@ -230,8 +234,13 @@ def search(
         seen = 1.0 if first else order[max(bound, key=lambda name: errors[name] / bound[name] / size[name])]
         stalls = stalls + 1 if not first and (seen <= LEAST_ORDER or worst >= best_yet) else 0
         best_yet = min(best_yet, worst)
+        relative = max(errors[name] / size[name] for name in bound)
+        if looks.wanted(relative):
+            until = yield from looks.look({name: tolerance * size[name] for name, tolerance in bound.items()})
+            if until < end:
+                raise NotReached(least_tol, worst, longer.stats["dt"], None, told(longer, shorter, limit), attempt, until)
         due = not looked and (attempt >= LATE or least_tol < FINE)
-        resolved = due and max(errors[name] / size[name] for name in bound) < RESOLVED
+        resolved = due and relative < RESOLVED
         if resolved or (stalls and not higher):
             looked = True
             other = yield estimates.nudged(problem), sharp, dt, found.t

@@ -13,7 +13,9 @@ from continuum import breathing_ring, rolling_rod, steered_rod, untwisting_rod
 from discs import Gauss6, Gauss8, SimulationError, State, checks, load, simulate
 from discs.integrators import DOP853
 from discs.running.failure import NotReached
-from discs.running.tolerance import ATTEMPTS, to_tolerance
+from discs.running.held import AGAIN, PART, Looks
+from discs.running.once import run_fixed
+from discs.running.tolerance import ATTEMPTS, answered, to_tolerance
 from tests.conftest import SLAVED, STEERED, TRUE, Model, models, uneven
 
 pytestmark = pytest.mark.slow
@@ -269,6 +271,61 @@ def test_tolerances_below_rounding_are_refused_after_a_look(monkeypatch):
         simulate(problem, tol=1e-12, frames=3, progress=False)
     assert caught.value.best.error_estimate["y"] > 1e-8
     assert caught.value.best.stats["steps"] < 500
+
+
+def rolling_at_random(n, duration):
+    """A twisted rod that rolls as a whole: its motion is chaotic, that of the rod at rest is not."""
+    problem = lump(untwisting_rod(duration=duration), n)
+    return replace(problem, initial=replace(problem.initial, omega=np.ones(n)))
+
+
+def test_a_chaotic_motion_is_followed_as_long_as_rounding_allows():
+    """Its time is named: until shortly before it a run holds the tolerance, after it two fine runs of another method differ.
+
+    Looking for it takes less than a tenth of the search.
+    """
+    problem, gradients = rolling_at_random(17, 1500.0), {"search": 0, "look": 0}
+
+    def run(of, method, dt, times):
+        made = run_fixed(of, method, dt, times)
+        gradients["look" if times[-1] < 1500.0 else "search"] += made.stats["gradients"]
+        return made
+
+    with pytest.raises(NotReached, match=r"tol = 0.001 can be held until about t = .* only, .*; end the run earlier") as caught:
+        to_tolerance(problem, "auto", 1e-3, np.array([750.0, 1500.0]), run)
+    assert 0 < gradients["look"] < 0.1 * gradients["search"]
+    until = caught.value.held_until
+    times = np.array([0.6, 1.6]) * until
+    one, other = (simulate(problem, "gauss6", dt, times, progress=False, engine="compiled") for dt in (0.02, 0.016))
+    near, late = np.abs(one.theta - other.theta).max(axis=1) / np.abs(one.theta).max()
+    assert near < 1e-3 < late
+    early = simulate(problem, tol=1e-3, frames=[0.6 * until], progress=False)
+    assert np.abs(early.theta - one.theta[0]).max() <= 1e-3 * np.abs(early.theta).max()
+    assert pickle.loads(pickle.dumps(caught.value)).held_until == until
+
+
+def looked(problem, used, part=PART):
+    """What a look finds after so many gradients, and the looks."""
+    looks = Looks(problem, problem.duration)
+    looks.used, looks._part = used, part
+    search = looks.look(dict.fromkeys(("x", "y", "theta"), 1e-3))
+    return answered(search, run_fixed), looks
+
+
+def test_a_regular_motion_is_looked_at_once():
+    found, looks = looked(lump(untwisting_rod(duration=60.0), 9), 10_000_000)
+    assert (found, looks.due) == (np.inf, np.inf)
+
+
+def test_steps_that_do_not_resolve_the_motion_show_nothing():
+    """Runs with long steps part at random: this growth is not shown to be that of the motion."""
+    found, looks = looked(rolling_at_random(9, 300.0), 10_000_000, part=2.0)
+    assert (found, looks._part) == (np.inf, 1.0)
+
+
+def test_a_look_that_ends_too_early_is_repeated():
+    found, looks = looked(rolling_at_random(9, 1500.0), 100_000)
+    assert (found, looks.due) == (np.inf, AGAIN * 100_000)
 
 
 def problem_of(seed):
