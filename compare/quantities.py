@@ -48,7 +48,7 @@ WANTS = (*PAIRS, "energy_density", "contact_force")
 
 def check_want(want: Iterable[str], scene: Scene) -> tuple[str, ...]:
     """The names in `want`; ValueError for one that is not compared."""
-    given = (want,) if isinstance(want, str) else tuple(want)
+    given = checks.several("want", want, "names of quantities")
     names = tuple(dict.fromkeys(checks.choice("want", name, WANTS) for name in given))
     if lacking := [name for name in names if name not in offered(scene)]:
         raise ValueError(

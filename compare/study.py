@@ -52,6 +52,7 @@ def convergence(
     """
     sizes, problems = checked_sizes(scene, n, ends, degree)
     want = check_want(want, scene)
+    checks.instance("field", field, Solution | None, "solve(scene, tol) of this scene, or None")  # type: ignore[arg-type]
     if field is None:
         field = solve(scene, tol, frames=1, progress=progress, want=want)
     if field.error_estimate is None or not np.isclose(field.t[-1], scene.duration, rtol=1e-12):

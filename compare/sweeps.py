@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from compare.background import NotStarted, background
 from compare.fingerprint import fingerprint
+from discs import checks
 from discs.files.results import Archive, Result, key_of, read, record
 from discs.running.calls import call_each, cores
 
@@ -58,7 +59,13 @@ def sweep(
     ValueError : for cases that JSON cannot store or that are equal, a function that cannot be sent to other processes, an
         archive of another function or that is none, or one that another sweep writes to.
     """
-    cases = list(cases)
+    if not callable(function):
+        raise ValueError(f"function must be a function of a case; got {checks.shown(function)}")
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise ValueError(f"executor must have a method submit, as those of concurrent.futures; got {checks.shown(executor)}")
+    if archive is not None:
+        archive = checks.path("archive", archive)
+    cases = list(checks.several("cases", cases, "cases, as a list of numbers"))
     keys = [key_of(case) for case in cases]
     if len(set(keys)) < len(keys):
         twice = next(key for i, key in enumerate(keys) if key in keys[:i])
@@ -77,7 +84,7 @@ def sweep(
                 bar.update()
                 bar.set_postfix(failed=sum(bool(r.error) for r in done.values()), refresh=False)
 
-            for given in (executor, None) if executor else (None,):
+            for given in (None,) if executor is None else (executor, None):
                 if rest:
                     with nullcontext(given) if given else background(min(cores(), len(rest))) as workers:
                         sent = _Sent(function)

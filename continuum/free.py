@@ -9,8 +9,7 @@ from continuum.free_run import compare, nodes, run
 from continuum.free_start import Data, Given, check
 from continuum.rod import Rod
 from discs import Solution, checks
-from discs.running.frames import frame_times
-from discs.running.once import MOST_STEPS
+from discs.running.frames import check_steps, frame_times
 from discs.running.stats import Stats
 
 MOST_NODES = 1_000_000
@@ -80,10 +79,7 @@ def free_rod(
     times = frame_times(frames, duration)
     if h > duration:
         raise ValueError(f"dt must be at most the duration, {duration:g}; got {h:g}")
-    if times[-1] / h > MOST_STEPS:
-        raise ValueError(
-            f"dt = {h:g} makes {times[-1] / h:.1g} steps to t = {times[-1]:g}, more than can be counted: take a larger dt"
-        )
+    check_steps(times[-1], h)
     r, v = Given("r0", r0, 2, chain), Given("v0", v0, 2, chain)
     start = r, v, Given("theta0", theta0, 1, chain), Given("omega0", omega0, 1, chain)
     words = [check(chain, r, v)]

@@ -13,6 +13,7 @@ different values of r'.
 """
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
@@ -55,8 +56,12 @@ class Given:
     def __init__(self, name: str, data: Data, rows: int, chain: Chain) -> None:
         self.name, self._rows, self._chain = name, rows, chain
         self.call: Callable[[Float], ArrayLike] | None = data if callable(data) else None
-        self.nodes = self._read(data(chain.s) if callable(data) else data, chain.n)
+        self.nodes = self._read(self._called(data, chain.s) if callable(data) else data, chain.n)
         self.rounding = ULPS * float(np.abs(self.nodes).max()) / chain.k
+
+    def _called(self, function: Callable[[Float], ArrayLike], s: Float) -> Any:
+        """The function's values at places s."""
+        return checks.called(self.name, function, s, where=f", at {s.size} places s from {s.min():g} to {s.max():g}")
 
     def _read(self, values: ArrayLike, size: int) -> Float:
         if self._rows == 1:
@@ -74,7 +79,7 @@ class Given:
     def at(self, s: Float, degree: int = DEGREE) -> Float:
         """Values at places s, (rows, s.size); those of an array by a spline."""
         if self.call is not None:
-            return self._read(self.call(s), s.size)
+            return self._read(self._called(self.call, s), s.size)
         return through(self._chain, self.nodes, degree)(s)
 
     def slopes(self, places: Float) -> tuple[Float, Float]:

@@ -79,6 +79,7 @@ def places(chain: Chain | SteeredChain) -> dict[str, Float]:
     return {name: np.minimum(rows[ROD[name].dims[0]], chain.length) for name in PARAMETERS}  # places are rounded
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is too large for doubles is lost
 def unseen(scene: Scene, problem: Problem) -> str:
     """The warning if the discs are too few to resolve the initial fields of a scene, or its parameters; otherwise empty.
 

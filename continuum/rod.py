@@ -65,7 +65,8 @@ class Rod:
             raise ValueError("spin_inertia must be positive where radius = 0; got 0 for both")
         if self.varying:
             s = np.linspace(0.0, self.length, CHECKED)
-            inertia = np.broadcast_to(self.at(s).inertia, s.shape)
+            with np.errstate(over="ignore"):  # refused with the energy of a problem
+                inertia = np.broadcast_to(self.at(s).inertia, s.shape)
             if not inertia.all():
                 raise ValueError(f"spin_inertia must be positive where radius = 0; got 0 for both at s = {s[np.argmin(inertia)]:g}")
         self._check_law()

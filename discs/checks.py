@@ -6,9 +6,11 @@ times, complex numbers (even with imaginary part 0) and arrays with masked entri
 
 import math
 import operator
+import os
 import reprlib
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +18,9 @@ from numpy.typing import ArrayLike
 from discs.arrays import Float
 
 MOST = 2**53  # the largest count; above it not every whole number is a double
+MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else math.inf  # bytes
 TEXTS = (str, bytes, bytearray, memoryview)
+Kind = TypeVar("Kind")
 
 
 class _Short(reprlib.Repr):
@@ -65,13 +69,50 @@ def whole(name: str, value: object, least: int | None = None, why: str = "") -> 
     return int(given)
 
 
+def flag(name: str, value: object) -> bool:
+    """Return `value` if it is a truth value, else raise ValueError."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False; got {shown(value)}")
+    return bool(value)
+
+
+def instance(name: str, value: object, kind: type[Kind], need: str) -> Kind:
+    """Return `value` if it is of this class, else raise ValueError that says what is needed."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} must be {need}; got {shown(value)}")
+    return value
+
+
+def several(name: str, value: object, need: str) -> tuple[Any, ...]:
+    """Return the entries of `value`, a text being one entry, else raise ValueError that says what is needed."""
+    if isinstance(value, str):
+        return (value,)
+    return tuple(instance(name, value, Iterable, need))  # type: ignore[type-abstract]
+
+
+def path(name: str, value: object) -> Path:
+    """Return `value` as a path if it is a text or a path, else raise ValueError."""
+    if not isinstance(value, str | Path) or not str(value):
+        raise ValueError(f"{name} must be the path of a file, a text or a Path; got {shown(value)}")
+    return Path(value)
+
+
 def number(name: str, value: object, *, positive: bool = False) -> float:
     """Return `value` as a finite float, positive if asked for, else raise ValueError."""
-    given = value if type(value) is float else np.nan if np.ndim(value) else _doubles(value)  # type: ignore[arg-type]
+    if type(value) is float and math.isfinite(value) and (value > 0 or not positive):
+        return value
+    found = _doubles(value)  # type: ignore[arg-type]
+    given = found if isinstance(found, str) else np.nan if found.ndim else float(found)
     if isinstance(given, str) or not math.isfinite(given) or (positive and given <= 0):
         why = f" ({given})" if isinstance(given, str) and given else ""
         raise ValueError(f"{name} must be a {'positive ' * positive}finite number; got {shown(value)}{why}")
     return float(given)
+
+
+def fits(name: str, doubles: float) -> None:
+    """Raise ValueError if so many doubles need more memory than the machine has, if the system tells how much that is."""
+    if 8 * doubles > MEMORY:
+        raise ValueError(f"{name}: {8e-9 * doubles:.3g} GB are needed, and this machine has {1e-9 * MEMORY:.3g} GB of memory")
 
 
 def array(name: str, value: ArrayLike, need: str = "finite numbers") -> Float:
@@ -200,7 +241,8 @@ def _odd(entry: object) -> str | None:
     if hasattr(entry, "dtype"):
         kind = np.asarray(entry).dtype.kind
         if kind == "O":  # an array without dimensions
-            return _odd(np.asarray(entry).item())
+            inner = np.asarray(entry).item()
+            return "" if inner is entry else _odd(inner)
         return None if kind in "iuf" else KINDS.get(kind, "")
     if isinstance(entry, (bool, complex)):
         return KINDS["b" if isinstance(entry, bool) else "c"]

@@ -6,6 +6,7 @@ ends the run there; `direction = 1` counts zeros that are crossed from below onl
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,10 +40,11 @@ class Line:
         checks.vector("point", self.point, 2)
         if not checks.vector("normal", self.normal, 2).any():
             raise ValueError("normal must be a vector other than zero; got (0, 0)")
+        _check(self)
 
     def __call__(self, now: Moment) -> float:
         beyond = self.normal[0] * (now.x - self.point[0]) + self.normal[1] * (now.y - self.point[1])
-        return float(beyond.max() if self.disc is None else beyond[self.disc])
+        return float(beyond.max() if self.disc is None else beyond[_of(now, self.disc)[0]])
 
 
 @dataclass(frozen=True)
@@ -68,11 +70,12 @@ class Touch:
 
     def __post_init__(self) -> None:
         checks.number("gap", self.gap, positive=True)
+        _check(self, "one", "other")
         if self.one == self.other:
             raise ValueError(f"a disc touches another one: one and other must differ; got {self.one} twice")
 
     def __call__(self, now: Moment) -> float:
-        pair = [self.one, self.other]
+        pair = _of(now, self.one, self.other)
         radius = np.broadcast_to(now.problem.chain.radius, now.x.size)[pair]
         if radius[0] != radius[1]:
             raise ValueError(f"Touch is for discs of equal radius; those of {self.one} and {self.other} are {radius}")
@@ -80,6 +83,25 @@ class Touch:
         axle = now.slope[:, pair] / np.hypot(*now.slope[:, pair])
         u, v = radius[0] * np.stack([-axle[1], axle[0]], axis=1)
         return _segments(a - u, a + u, b - v, b + v) - self.gap
+
+
+def _check(event: Any, *discs: str) -> None:
+    """Check what all events have in common, and the numbers of their discs."""
+    for name in discs or ("disc",):
+        if discs or event.disc is not None:
+            checks.whole(name, getattr(event, name))
+    checks.flag("terminal", event.terminal)
+    if checks.whole("direction", event.direction) not in (-1, 0, 1):
+        raise ValueError(f"direction must be 1, from below only, -1, from above only, or 0, both; got {event.direction}")
+
+
+def _of(now: Moment, *discs: int) -> list[int]:
+    """Numbers of discs; ValueError if the chain has not so many. Negative ones count from the end."""
+    n = now.x.size
+    for disc in discs:
+        if not -n <= disc < n:
+            raise ValueError(f"disc must be one of the {n} discs, 0 to {n - 1}; got {disc}")
+    return list(discs)
 
 
 def _segments(a: Float, b: Float, c: Float, d: Float) -> float:
@@ -118,8 +140,9 @@ class FrictionExceeded:
 
     def __post_init__(self) -> None:
         checks.number("mu", self.mu, positive=True)
+        _check(self)
 
     def __call__(self, now: Moment) -> float:
         pressed = checks.field("weight", self.weight, now.x.size, least=0.0, strict=True)
         needed = np.hypot(*now.contact_force) / pressed
-        return float((needed.max() if self.disc is None else needed[self.disc]) - self.mu)
+        return float((needed.max() if self.disc is None else needed[_of(now, self.disc)[0]]) - self.mu)

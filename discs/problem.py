@@ -76,6 +76,8 @@ class Problem:
     loads: tuple[Load | OnRod, ...] = ()
 
     def __post_init__(self) -> None:
+        checks.instance("chain", self.chain, Chain | SteeredChain, "a Chain or a SteeredChain")  # type: ignore[arg-type]
+        checks.instance("initial", self.initial, State, "a State, as State(x, y, theta, omega)")
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
         if np.size(self.initial.x) != self.chain.n:
             raise ValueError(f"initial state must have the chain's {self.chain.n} discs; got {np.size(self.initial.x)}")
@@ -83,13 +85,15 @@ class Problem:
         if steered != (self.initial.phi is not None):
             need = "needs initial headings phi" if steered else "takes its headings from the line: leave phi out"
             raise ValueError(f"{type(self.chain).__name__} {need}")
-        self._check_loads()
-        if isinstance(self.chain, Chain):
-            self._check_slopes(self.chain)
-        else:
-            self._check_inertia(np.asarray(self.chain.radius) > 0, "radius = 0")
-        if self.loads:
-            self._check_forces()
+        with np.errstate(all="ignore"):  # what overflows is refused
+            self._check_loads()
+            if isinstance(self.chain, Chain):
+                self._check_slopes(self.chain)
+            else:
+                self._check_inertia(np.asarray(self.chain.radius) > 0, "radius = 0")
+            if self.loads:
+                self._check_forces()
+            self._check_energy()
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arguments only: other processes build the system again."""
@@ -111,6 +115,18 @@ class Problem:
                     signals.check(drive.signal, self.duration, drive.name)
             if isinstance(load, Held):
                 self._check_motor(load)
+
+    def _check_energy(self) -> None:
+        """Refuse what is too large for doubles."""
+        if np.isfinite(self.energy()):
+            return
+        fields = [(name, value) for part in (self.chain, self.initial) for name, value in vars(part).items() if name != "n"]
+        sizes = {name: np.abs(value).max() for name, value in fields if isinstance(value, np.ndarray | float) and np.size(value)}
+        name = max(sizes, key=lambda name: sizes[name])
+        raise ValueError(
+            f"the initial energy is too large for a double, or infinite; the largest of what is given is {name}, up to "
+            f"{sizes[name]:.3g}: change units, or the loads"
+        )
 
     def _check_forces(self) -> None:
         """Refuse forces of the initial state that are no finite numbers for each coordinate and disc, or not always the same."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from discs import checks
 from discs.arrays import Float
 from discs.integrators import Integrator, find, from_settings
 from discs.kernels.background import usual
@@ -83,22 +84,27 @@ def simulate(
     """
     if not isinstance(problem, Problem):
         if isinstance(problem, LinkageProblem):
-            if checkpoint is not None or events != ():
+            if checkpoint is not None or type(events) is not tuple or events:
                 raise ValueError("a linkage runs without checkpoint and events: leave them out, and save the run by its `save`")
             return linkage_run(problem, method, dt, frames, want, progress, tol)
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
-    engine, nothing = engine or usual(), method is None and dt is None
-    if events != ():
+    engine, nothing = usual() if engine is None else engine, method is None and dt is None
+    if checkpoint is not None:
+        checkpoint = checks.path("checkpoint", checkpoint)
+    if method is not None and (type(method) is not str or not method):
+        method = find(method)
+    if type(events) is not tuple or events:
         events = checked_events(events)
+    if events:
         method = "gauss6" if method == "auto" or nothing else method
     if engine == "auto" and checkpoint is not None:
         engine = "compiled"
-    want = tuple(want) if want != () and isinstance(want, Iterator) else want  # a run may begin anew
+    want = tuple(want) if type(want) is not tuple and isinstance(want, Iterator) else want  # a run may begin anew
     asked = Asked(want, progress, engine, checkpoint)
     if method == "auto" or tol is not None or nothing:
         if dt is not None:
             raise ValueError("give dt or tol, not both: tol (and method='auto') finds the step")
-        found, doubt = _search(problem, method or "auto", frames, asked, tol, events)
+        found, doubt = _search(problem, "auto" if method is None else method, frames, asked, tol, events)
     elif events:
         found, doubt = _eventful(problem, find(method or "midpoint"), dt, frames, asked, events), ""
     else:

@@ -27,7 +27,7 @@ from discs.integrators import Integrator, Midpoint, find
 from discs.integrators.collocated import Collocated
 from discs.kernels.background import usual
 from discs.problem import Problem
-from discs.running.frames import frame_times, steps_before
+from discs.running.frames import check_steps, frame_times, steps_before
 from discs.running.progress import NO_BAR, Progress
 from discs.running.suggest import suggest_dt
 from discs.simulation import simulate
@@ -82,13 +82,17 @@ def gradient(
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"gradient takes a Problem, as `compare.lump(scene, n)` makes; got {checks.shown(problem)}")
+    for name, function in (("cost", cost), ("cost_gradient", cost_gradient)):
+        if not (callable(function) or (function is None and name == "cost_gradient")):
+            raise ValueError(f"{name} must be a function of a run; got {checks.shown(function)}")
     names = _names(problem, wrt)
     integrator = _checked(problem, method)
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > problem.duration:
         raise ValueError(f"dt must be at most the duration {problem.duration:g}; got {h:g}")
+    check_steps(problem.duration, h)
     times = frame_times(frames, problem.duration)
-    engine = engine or usual()
+    engine = usual() if engine is None else engine
     adjoint = _Adjoint(problem, integrator, h, names, ready(problem, integrator, engine))
     with Progress("gradient", steps_before(float(times[-1]), h)[0]) if progress else NO_BAR as bar:
         return adjoint.gradient(times, cost, cost_gradient, engine, bar.update if bar else _unseen)
@@ -99,11 +103,11 @@ def _unseen(step: int) -> None:
 
 
 def _names(problem: Problem, wrt: Iterable[str]) -> tuple[str, ...]:
-    names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
+    names = checks.several("wrt", wrt, "names of parameters")
     steered = len(problem.system.rows) == 4
     known = [name for name in (*INITIAL, *INERTIAS, *STIFFNESSES) if name in vars(problem.chain) or name in problem.system.rows]
     known += ["omega", *["phi_rate"] * steered]
-    if not names or any(name not in known and not str(name).startswith("loads[") for name in names):
+    if not names or not all(isinstance(name, str) and (name in known or name.startswith("loads[")) for name in names):
         known += ["'loads[0].pattern' and the like"] if problem.loads else []
         raise ValueError(f"wrt must be names among {', '.join(dict.fromkeys(known))}; got {checks.shown(wrt)}")
     return names

@@ -22,6 +22,7 @@ from discs import checks
 from discs.analysis.tangent import Flow
 from discs.arrays import Float
 from discs.problem import Problem
+from discs.running.frames import check_steps
 from discs.running.suggest import suggest_dt
 
 WAVES = 4  # of each coordinate, the constant among them
@@ -65,6 +66,7 @@ def growth(problem: Problem, dt: float | None = None, method: str = "gauss4", mo
         raise ValueError(f"growth is that of a Problem, as `compare.lump(scene, n)` makes; got {checks.shown(problem)}")
     flow, most = Flow(problem, method), checks.number("most", most, positive=True)
     h = suggest_dt(problem, method) if dt is None else checks.number("dt", dt, positive=True)
+    check_steps(problem.duration, h)
     steps = max(1, int(np.ceil(problem.duration / h - 1e-9)))
     h = problem.duration / steps
     unit, y, found = np.repeat(problem.system.scale, problem.chain.n), flow.start, [1.0]

@@ -25,6 +25,7 @@ from discs import checks
 from discs.analysis.tangent import Flow, units
 from discs.arrays import Float
 from discs.problem import Problem
+from discs.running.frames import check_steps
 from discs.running.suggest import suggest_dt
 
 BLOCKS = 10
@@ -86,12 +87,14 @@ def lyapunov(
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"lyapunov takes a Problem, as `compare.lump(scene, n)` makes; got {checks.shown(problem)}")
+    count, every, seed = checks.whole("count", count, 1), checks.whole("every", every, 1), checks.whole("seed", seed, 0)
     flow = Flow(problem, method)
     size = flow.start.size
-    count, every = checks.whole("count", count, 1), checks.whole("every", every, 1)
     if count > size:
         raise ValueError(f"count must be at most {size}, the number of coordinates and momenta; got {count}")
     h = suggest_dt(problem, method) if dt is None else checks.number("dt", dt, positive=True)
+    check_steps(problem.duration, h)
+    checks.fits(f"dt = {h:g}", count * problem.duration / (every * h))
     intervals = int(np.ceil(problem.duration / (every * h) - 1e-9))
     if intervals < 2 * BLOCKS:
         raise ValueError(

@@ -118,7 +118,7 @@ def ready(problem: Problem, integrator: Any, engine: str | None = None) -> bool:
 
     engine : as for `simulate`; None for the usual one.
     """
-    engine = engine or usual()
+    engine = usual() if engine is None else engine
     if plain_because(problem, integrator, engine, ()):
         return False
     if engine != "compiled":

@@ -10,6 +10,7 @@ from discs.arrays import Float
 from discs.chains import elements, links, stencils
 from discs.chains.rolling import ROLLING, RollingLaw
 
+FIELDS = 16  # numbers to a disc, at least, in a chain and its state
 SHORTEST = 1e-60  # spacing; its fourth power, times stiffness or inertia, does not underflow
 FEWEST = {"springs": 3, "paper": 3, "consistent": 4, "ring": 5}
 WHY = {  # the reason for `FEWEST`
@@ -114,6 +115,7 @@ class Chain(Spaced):
         checks.choice("curvature", self.curvature, links.CURVATURE)
         n = checks.whole(f"n (discs, ends={self.ends!r})", self.n, FEWEST[self.ends], WHY[self.ends])
         object.__setattr__(self, "n", n)
+        checks.fits(f"n = {n} discs", FIELDS * n)
         joints = n - (self.ends != "ring")
         _settle(
             self,
@@ -199,6 +201,7 @@ class SteeredChain(Spaced):
         n = checks.whole(f"n (discs, ends={self.ends!r})", self.n, least, why)
         object.__setattr__(self, "degree", elements.check(self.degree, n, self.ends))
         object.__setattr__(self, "n", n)
+        checks.fits(f"n = {n} discs", FIELDS * n)
         links = n - (self.ends != "ring")
         _settle(
             self,

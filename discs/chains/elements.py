@@ -43,7 +43,7 @@ def check(degree: object, n: int, ends: str) -> int:
 
 def refuse(degree: object) -> None:
     """ValueError for elements of discs whose headings follow the line."""
-    if degree != 1:
+    if checks.whole("degree", degree) != 1:
         raise ValueError(
             f"degree={checks.shown(degree)} needs discs with headings of their own (a SteeredRod, rolling='own'): headings that "
             "follow the line need r' at the discs, where parabolas of neighbouring elements differ in it; leave degree out"

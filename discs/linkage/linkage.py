@@ -73,7 +73,9 @@ class Linkage:
     turns: int = 0
 
     def __post_init__(self) -> None:
+        checks.flag("closed", self.closed)
         n = checks.whole("n (nodes)", self.n, 3 if self.closed else 2, "a link joins two nodes")
+        checks.fits(f"n = {n} nodes", 32 * n)
         links = n - (not self.closed)
         settled: dict[str, Any] = {"n": n, "turns": checks.whole("turns", self.turns)}
         for name in PER_NODE:
@@ -114,7 +116,7 @@ class Linkage:
                     )
 
     def _check_held(self) -> None:
-        for entry in self.held:
+        for entry in checks.several("held", self.held, "pairs, as ((0, 'phi'), (0, 'y'))"):
             if not isinstance(entry, tuple) or len(entry) != 2:
                 raise ValueError(f"held must be pairs, as ((0, 'phi'), (0, 'y')); got {checks.shown(self.held)}")
             node, what = checks.whole("node of held", entry[0], 0), entry[1]

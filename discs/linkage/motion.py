@@ -11,7 +11,7 @@ from discs.arrays import Float
 from discs.linkage.midpoint import Moment, Stepper
 from discs.linkage.problem import LinkageProblem
 from discs.running.failure import SimulationError
-from discs.running.frames import frame_times, steps_before
+from discs.running.frames import check_steps, frame_times, steps_before
 from discs.running.progress import NO_BAR, Progress
 from discs.running.stats import Stats
 from discs.solution import Solution
@@ -34,9 +34,9 @@ def run(
     The error is that of x, y relative to the length, and of theta and phi in rad, at the frames: a third of the difference of two
     runs. Other arguments and errors are those of `discs.simulate`.
     """
-    if method not in (None, "midpoint", "auto"):
+    if not (method is None or (isinstance(method, str) and method in ("midpoint", "auto"))):
         raise ValueError(f"a linkage runs by 'midpoint', which takes rigid links; got method={checks.shown(method)}")
-    for name in () if want == () else [want] if isinstance(want, str) else want:
+    for name in checks.several("want", want, "names of quantities"):
         checks.choice("want (of a linkage)", name, ("velocity",))  # always there
     times = frame_times(frames, problem.duration)
     if dt is not None:
@@ -45,6 +45,7 @@ def run(
         h = checks.number("dt", dt, positive=True)
         if h > problem.duration * (1 + 1e-12):
             raise ValueError(f"dt must be at most the duration, {problem.duration:g}; got {h:g}")
+        check_steps(problem.duration, h)
         return _fixed(problem, h, times, progress)
     tolerance = 1e-4 if tol is None else checks.number("tol", tol, positive=True)
     h, last = problem.duration / FEWEST, None

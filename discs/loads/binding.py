@@ -46,9 +46,9 @@ class OnRod(ABC):
 
     def _number(self, name: str, value: Pattern, least: float | None = None) -> float:
         """A pattern of a load at a point."""
-        if callable(value) or np.ndim(value):
+        if callable(value):
             raise ValueError(f"{name} of {self._name} with at= is one number; got {checks.shown(value)}")
-        number = checks.number(f"{name} of {self._name}", value)
+        number = checks.number(f"{name} of {self._name} with at=", value)
         if least is not None and number < least:
             raise ValueError(f"{name} of {self._name} must be finite and at least {least:g}; got {number:g}")
         return number
@@ -86,8 +86,11 @@ def sampled(name: str, pattern: Pattern, places: Float, least: float | None = No
 
 
 def given(pattern: Pattern) -> bool:
-    """Whether a pattern is not zero."""
-    return callable(pattern) or bool(np.any(pattern))
+    """Whether a pattern is not zero. What is no pattern counts too: it is refused where it is used."""
+    try:
+        return callable(pattern) or bool(np.any(pattern))
+    except (ValueError, TypeError):
+        return True
 
 
 def within(chain: Discs, places: Float) -> Float:

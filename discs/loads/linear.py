@@ -75,7 +75,7 @@ class Linear(Load):
 
     def __post_init__(self) -> None:
         names = ("constant", "damping", "stiffness")
-        given = [np.asarray(getattr(self, name), dtype=float) for name in names]
+        given = [checks.array(f"{name} of Linear", getattr(self, name)) for name in names]
         try:
             values = np.broadcast_arrays(*given, *(np.empty(drive.pattern.shape) for drive in self.drives))[:3]
         except ValueError:
@@ -88,12 +88,15 @@ class Linear(Load):
         if self.viscosity is not None and self.constant.ndim != 2:
             raise ValueError(f"constant, damping or stiffness must be (rows, discs) if viscosity is given; got {self.constant}")
         if self.viscosity is not None:
-            links, need = np.array(self.viscosity, dtype=float), (len(self.constant) - 2, self.constant.shape[-1] + 1)
+            links, need = checks.array("viscosity of Linear", self.viscosity), (len(self.constant) - 2, self.constant.shape[-1] + 1)
             if links.shape != need or not np.isfinite(links).all() or (links < 0).any():
                 raise ValueError(
-                    f"viscosity must be finite, at least 0 and of shape {need}; got {checks.shown(links)}: {links.min():g}"
+                    f"viscosity must be finite, at least 0 and of shape {need}; got {checks.shown(links)}: {links.min(initial=0):g}"
                 )
             object.__setattr__(self, "viscosity", links)
+        object.__setattr__(self, "offset", checks.number("offset of Linear", self.offset))
+        if not (self.floor is None or (isinstance(self.floor, float) and self.floor == -np.inf)):
+            object.__setattr__(self, "floor", checks.number("floor of Linear", self.floor))
         damped = self.damping.any() or self.viscosity is not None or (self.bends is not None and self.bends.viscosity.any())
         object.__setattr__(self, "conservative", not damped and not self.drives)
         object.__setattr__(self, "passive", not self.drives)

@@ -163,6 +163,7 @@ class Custom(OnRod):
         """
         if not callable(self.force) or not (self.power is None or callable(self.power)):
             raise ValueError(f"force and power of Custom must be functions of t, q and v; got {checks.shown(self)}")
+        checks.flag("per_length of Custom", self.per_length)
         return _Own(self, w, rows)
 
 

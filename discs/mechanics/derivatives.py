@@ -82,7 +82,10 @@ class Formula:
     def __call__(self, q: Float) -> Float:
         """The value at q, finite or not."""
         with np.errstate(all="ignore"), _double():
-            given = self._call(np.array(q, dtype=float))
+            try:
+                given = self._call(np.array(q, dtype=float))
+            except ArithmeticError as error:
+                raise ValueError(f"{self.name}({self.arguments}) raised {type(error).__name__}: {error}") from error
         value = self._array(given, None)
         kind = value.dtype.kind
         if kind not in "fiuO" or (kind == "f" and value.dtype.itemsize < 8):

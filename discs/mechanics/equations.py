@@ -272,4 +272,4 @@ def _not_linear(*state: Float) -> Matrix:
 
 def names_of(what: str, given: Sequence[str]) -> tuple[str, ...]:
     """Names as a tuple; a string is one name."""
-    return (given,) if isinstance(given, str) else tuple(given)
+    return checks.several(what, given, "names")

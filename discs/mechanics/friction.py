@@ -114,6 +114,7 @@ def first_slip(run: Solution, weight: ArrayLike, mu: ArrayLike, ends: bool = Fal
     ValueError : as `friction_needed`; if mu is not positive; if no disc is away from the ends.
     """
     needed, away = _needed(run, weight), inner(run)
+    checks.flag("ends", ends)
     if not ends and not away.any():
         raise ValueError(f"none of {away.size} discs is an eighth of the length away from the free ends; take ends=True")
     excess = needed - checks.field("mu", mu, needed.shape[1], least=0.0, strict=True)
@@ -140,7 +141,7 @@ def first_slip(run: Solution, weight: ArrayLike, mu: ArrayLike, ends: bool = Fal
 
 def _needed(run: Solution, weight: ArrayLike) -> Float:
     """|lambda|/N of each disc, (F, n)."""
-    force = forces(run)
+    force = forces(checks.instance("run", run, Solution, 'a run with want=("contact_force",)'))
     pressed = checks.field("weight", weight, run.x.shape[1], least=0.0, strict=True)
     needed: Float = np.hypot(force[:, 0], force[:, 1]) / pressed
     return needed

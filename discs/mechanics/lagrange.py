@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
+from discs import checks
 from discs.arrays import Float
 from discs.mechanics import MechanicalSystem
 from discs.mechanics.bodies import Bodies
@@ -31,6 +32,8 @@ def lagrange_dalembert(problem: Problem, dense: bool = False) -> MechanicalSyste
     ------
     ValueError : for loads, as they are parts of a run: give the system their forces as `applied`.
     """
+    checks.instance("problem", problem, Problem, "a Problem, as `compare.lump(scene, n)` makes")
+    checks.flag("dense", dense)
     if problem.loads:
         raise ValueError(
             "lagrange_dalembert takes a problem without loads; got some: take replace(problem, loads=()), and give "

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from discs import checks
 from discs.arrays import Float, Int
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.work import Stops
@@ -36,6 +37,8 @@ class Album:
         self.names = *system.rows, *system.rates[2:], "energy", "rolling_residual"
         self.steps, self.rests = all_steps_before(times, h)
         rows, n, self.done = len(system.rows), system.n, 0
+        if times.size > 1:
+            checks.fits(f"frames = {times.size}", (2 * rows * n + 2) * times.size)
         self.q, self.told = np.empty((rows, times.size, n)), np.empty((2, times.size))
         self.rates = np.empty((rows - 2, times.size, n))
 

@@ -72,7 +72,7 @@ def simulate_many(
     ValueError : for no problems, or arguments that no run can take; for a checkpoint of other runs, or of something else.
     KeyboardInterrupt : on Ctrl-C; with a checkpoint the parts that are done are kept.
     """
-    given = tuple(problems)
+    given = checks.several("problems", problems, "problems, as `compare.lump(scene, n)` makes")
     for problem in given:
         if not isinstance(problem, Problem):
             raise ValueError(f"simulate_many takes Problems, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
@@ -82,10 +82,14 @@ def simulate_many(
         raise ValueError("give dt or tol, not both: tol finds the step")
     if dt is not None:
         dt = checks.number("dt", dt, positive=True)
-    if method is not None and method != "auto":
+    if method is not None and not (isinstance(method, str) and method == "auto"):
         method = find(method)
     threads = cores() if threads is None else checks.whole("threads", threads, 1)
-    asked = (want,) if isinstance(want, str) else tuple(want)
+    asked = checks.several("want", want, "names of quantities")
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise ValueError(f"executor must have a method submit, as those of concurrent.futures; got {checks.shown(executor)}")
+    if checkpoint is not None:
+        checkpoint = checks.path("checkpoint", checkpoint)
     settings = Settings(method, dt, tol, frames, asked, checks.choice("engine", engine, ("compiled", "plain")))
     done = _run(given, settings, checkpoint, executor, threads, progress)
     runs = Runs(
@@ -126,7 +130,9 @@ def _run(
                 shown.update(count)
 
         calls = {k: (part, [problems[i] for i in part.numbers], settings) for k, part in rest.items()}
-        pool = nullcontext(executor) if executor else ThreadPoolExecutor(threads, initializer=HALT.set, initargs=(halt,))
+        pool: Any = nullcontext(executor)
+        if executor is None:
+            pool = ThreadPoolExecutor(threads, initializer=HALT.set, initargs=(halt,))
         with _notice(settings, progress), pool as workers:
             try:
                 call_each(workers, run_part, calls, took)

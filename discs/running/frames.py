@@ -13,7 +13,14 @@ from discs.loads.motor import Held
 from discs.running.time_loop import March
 
 WANTS = ("velocity", "slope", "contact_force", "work_by_load")
+MOST_STEPS = 2.0**53
 ROUNDING = 1e-12  # relative to the duration: a time beyond the end by less counts as the end
+
+
+def check_steps(end: float, h: float) -> None:
+    """ValueError if there are more steps of length h to a time than can be counted."""
+    if end / h > MOST_STEPS:
+        raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")
 
 
 def steps_before(time: float, h: float) -> tuple[int, float]:
@@ -30,7 +37,10 @@ def frame_times(frames: int | ArrayLike, duration: float) -> Float:
     """
     if type(frames) is int or (not isinstance(frames, (list, tuple)) and np.ndim(frames) == 0):
         count = checks.whole("frames", frames, 1, "the last state is always one")
-        return np.linspace(0.0, duration, count) if count > 1 else np.array([duration])
+        if count == 1:
+            return np.array([duration])
+        checks.fits(f"frames = {count}", count)
+        return np.linspace(0.0, duration, count)
     need = f"increasing times within [0, {duration:g}], or their number"
     times = checks.array("frames", frames, need)
     near = np.clip(times, 0.0, duration)
@@ -44,11 +54,7 @@ def frame_times(frames: int | ArrayLike, duration: float) -> Float:
 
 def wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
     """The names in `want`, checked; ValueError for one that is neither in `WANTS` nor in `offers` of the method."""
-    if want == ():
-        return ()
-    if not isinstance(want, Iterable):
-        raise ValueError(f"want must be names of quantities; got {checks.shown(want)}")
-    given = (want,) if isinstance(want, str) else tuple(want)
+    given = checks.several("want", want, "names of quantities")
     return tuple(checks.choice("want", name, (*WANTS, *offers)) for name in given)
 
 

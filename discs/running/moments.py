@@ -20,7 +20,7 @@ from discs.integrators.work import Frame
 from discs.kernels.background import usual
 from discs.problem import Problem, State
 from discs.running.engine import plain_because, refuse_loads
-from discs.running.frames import ROUNDING, asked, steps_before
+from discs.running.frames import ROUNDING, asked, check_steps, steps_before
 from discs.running.ready import kernels
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
@@ -127,11 +127,12 @@ def by_steps(problem: Problem, integrator: Integrator, dt: float | None, engine:
             "chooses its own"
         )
     refuse_loads(problem, integrator)
-    because = plain_because(problem, integrator, engine := engine or usual(), ())
+    because = plain_because(problem, integrator, engine := usual() if engine is None else engine, ())
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration:
         raise ValueError(f"dt must be at most the duration, {problem.duration:g}; got {h:g}")
     compiled = not because and bool(kernels(engine, problem, integrator, h, True, True))
+    check_steps(end, h)
     march = March(problem, integrator, h, compiled)
     steps, rest = steps_before(end, h)
     last = Moment(march, march.frame(0.0), 0.0)

@@ -16,7 +16,7 @@ from discs.integrators.work import Cut
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.engine import WAITING, Overtaken, plain_because, refuse_loads
-from discs.running.frames import ROUNDING, frame_times, observed, steps_before, wanted
+from discs.running.frames import MOST_STEPS, ROUNDING, check_steps, frame_times, observed, steps_before, wanted
 from discs.running.progress import NO_BAR, Progress
 from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows
@@ -26,7 +26,6 @@ from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
 from discs.solution import Solution
 
-MOST_STEPS = 2.0**53
 Result = TypeVar("Result")
 Given = ParamSpec("Given")
 
@@ -75,7 +74,7 @@ def run_once(
     estimate : of the errors, if known.
     """
     _, progress, engine, checkpoint = asked
-    want = () if asked.want == () else wanted(asked.want, integrator.offers)
+    want = () if type(asked.want) is tuple and not asked.want else wanted(asked.want, integrator.offers)
     because = plain_because(problem, integrator, engine, want)
     suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
@@ -84,7 +83,7 @@ def run_once(
     times = frame_times(frames, problem.duration) if checked else np.asarray(frames)
     end = float(times[-1])
     if end / h > MOST_STEPS:
-        raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")
+        check_steps(end, h)
     system = problem.system
     refuse_loads(problem, integrator)
     offered = set(want) & set(integrator.offers)

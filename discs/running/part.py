@@ -73,7 +73,7 @@ def in_lanes(settings: Settings) -> Integrator | str | None:
         return None
     if to_a_tolerance(settings) and settings.method in (None, "auto"):
         return "auto"
-    integrator = find(settings.method or "midpoint")
+    integrator = find("midpoint" if settings.method is None else settings.method)
     return integrator if isinstance(integrator, FixedStep) and integrator.in_lanes else None
 
 

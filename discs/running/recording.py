@@ -56,6 +56,7 @@ class Rows:
     def write(self, f: int, found: dict[str, Any]) -> None:
         """Store frame f."""
         if not self.rows:
+            checks.fits(f"frames = {self.times.size}", self.times.size * sum(np.size(value) for value in found.values()))
             for name, value in found.items():
                 shape = value.shape if type(value) is np.ndarray else ()
                 self.rows[name] = np.empty((self.times.size, *shape))

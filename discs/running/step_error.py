@@ -158,8 +158,12 @@ def converging(
         if tally.unconverged:
             break
         before, t = after, t + h
-    for halving in range(1, HALVINGS + 1):
-        if not advanced(system, integrator, before, t, h / 2**halving, 2**halving, parameters)[1].unconverged:
+    shorter, count = h, 1
+    for _ in range(HALVINGS):
+        shorter, count = 0.5 * shorter, 2 * count
+        after, tally = advanced(system, integrator, before, t, shorter, 1, parameters)  # most fail in the first step
+        if not tally.unconverged:
+            _, tally = advanced(system, integrator, after, t + shorter, shorter, count - 1, parameters)
+        if not tally.unconverged:
             break
-    shorter: float = h / 2**halving
     return shorter

@@ -3,6 +3,7 @@
 import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
+from discs import checks
 from discs.arrays import Float
 from discs.integrators import Integrator, find
 from discs.problem import Problem
@@ -26,7 +27,7 @@ def suggest_dt(problem: Problem, method: str | Integrator = "midpoint") -> float
     Omega^2 the largest eigenvalue of C^T S C at the start; the factor 0.7 allows for slopes |r'| that grow.
     """
     integrator = find(method)
-    chain = problem.chain
+    chain = checks.instance("problem", problem, Problem, "a Problem, as `compare.lump(scene, n)` makes").chain
     if integrator.adaptive:
         return problem.duration / 10
     if not np.isfinite(integrator.stability_limit):
