@@ -1,6 +1,5 @@
 """Discs with own headings: their limits, and their distance from the paper's rod."""
 
-import csv
 import time
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -16,8 +15,9 @@ from tqdm import tqdm
 from compare import figures
 from compare.lump import lump
 from compare.outputs import fresh_files
-from compare.results import Study, format_table
+from compare.results import Study
 from compare.study import apart, convergence
+from compare.tables import aligned, write_csv
 from continuum import solve, steered_rod, untwisting_rod
 from discs import Gauss8, Solution, simulate
 from discs.arrays import Float
@@ -155,18 +155,17 @@ def limits(
         locks += [(f"{a:g}", f"{r:.4f}") for a, r in zip(LOCKING, reach, strict=True)]
         table = [studies[0].columns, *(row for study in studies for row in study.rows())]
         for name, lines in (("headings.csv", table), ("limits.csv", rows), ("locking.csv", locks)):
-            with (folder / name).open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows(lines)
+            write_csv(folder / name, lines)
         _draw(studies, unit, paper, reach).savefig(folder / "limits.png", dpi=150)
     text = [
         f"discs with headings of their own, A = G = 10, J = 0.25, t = 4.5 (field's estimated error {studies[0].floor:.1e})",
-        format_table(table),
+        aligned(table),
         f"\nto reach an error of {REACHED:g} in all fields, gauss8, 30 steps",
-        format_table(efforts),
+        aligned(efforts),
         "\nrods with headings of their own, A, G, J, against rods whose headings are slaved to the line, t = 4.5",
-        format_table(rows),
+        aligned(rows),
         "\nA = G to infinity, J = 0.05: the rod locks",
-        format_table(locks),
+        aligned(locks),
     ]
     return "\n".join(text)
 

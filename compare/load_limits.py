@@ -1,6 +1,5 @@
 """Loaded rods and rods that vary: N discs against the field, N -> infinity, under one load after the other."""
 
-import csv
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
@@ -11,8 +10,9 @@ import numpy as np
 from tqdm import tqdm
 
 from compare.outputs import fresh_files
-from compare.results import Study, format_table
+from compare.results import Study
 from compare.study import convergence
+from compare.tables import aligned, write_csv
 from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
 from discs.arrays import Float
 from discs.loads import Damping, Motor, OnRod, Rest, Slope, Torque, signals
@@ -141,10 +141,9 @@ def load_limits(out: str | Path, progress: bool = True, n: tuple[int, ...] = SIZ
         bar = tqdm(given.items(), desc="loads", unit="load", disable=not progress)
         found = {name: study(scene, n, tol) for name, scene in bar}
         rows = list(_rows(found))
-        with (folder / "loads.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(rows)
+        write_csv(folder / "loads.csv", rows)
         figures.save(figures.loads(found), folder / "loads.png")
-    return format_table(rows)
+    return aligned(rows)
 
 
 def _rows(found: dict[str, list[Study]]) -> Iterable[tuple[str, ...]]:

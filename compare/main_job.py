@@ -12,8 +12,9 @@ from tqdm import tqdm
 from compare.lump import lump
 from compare.outputs import fresh_files
 from compare.quantities import offered
-from compare.results import Study, format_table, write_csv
+from compare.results import Study, write_studies
 from compare.study import checked_sizes, convergence
+from compare.tables import aligned
 from continuum import Scene, solve
 from discs import Solution, simulate, suggest_dt
 
@@ -70,7 +71,7 @@ def overview(
         beside = [executor.submit(study, ends=ends, degree=of_links, progress=False)] if executor and others else []
         here = [study(ends=ends, degree=of_links, progress=progress) for ends, of_links in kinds[len(beside) :]]
         studies = [_awaited(future, f"discs, {'own' if scene.steered else 'springs'}", progress) for future in beside] + here
-        write_csv(folder / "convergence.csv", studies)
+        write_studies(folder / "convergence.csv", studies)
         studies[0].plot(folder / "convergence.png", *studies[1:])
         figures.save(limit_figures.limits_of_all(studies)[0], folder / "limits-of-all.png")
         figures.motion(field, scene).savefig(folder / "motion.png", dpi=150)
@@ -110,7 +111,7 @@ def energy_runs(scene: Scene, n: int = 32, progress: bool = False) -> dict[str, 
 def summary(studies: list[Study]) -> str:
     """The table of all studies, and the field's estimated error."""
     scene, floor = studies[0].scene, max(s.floor for s in studies)
-    table = format_table([studies[0].columns, *(row for study in studies for row in study.rows())])
+    table = aligned([studies[0].columns, *(row for study in studies for row in study.rows())])
     return (
         f"{scene.name}, {scene.law}, t = {scene.duration:g}: largest error over the discs "
         f"against the field (estimated error {floor:.1e})\n{table}\n\n"

@@ -5,8 +5,9 @@ from pathlib import Path
 
 from compare.main_job import LONG
 from compare.outputs import fresh_files
-from compare.page import Page, table
+from compare.page import Page
 from compare.results import Study
+from compare.tables import markdown
 
 NAME = "index.html"
 
@@ -63,7 +64,7 @@ def _discs(page: Page, studies: list[Study]) -> None:
         "## N → ∞",
         "The table gives the largest error over the discs at the end of the motion, in length and rad, for each number of discs. "
         "An order of 2 means that twice as many discs have a quarter of the error.",
-        table(studies[0].columns, (row for study in studies for row in study.rows())),
+        markdown(studies[0].columns, (row for study in studies for row in study.rows())),
     )
     caption = f"Errors of N discs against the field, whose own estimated error is {floor:.1e}."
     page.picture("convergence.png", caption, "convergence.csv")
@@ -74,7 +75,7 @@ def _discs(page: Page, studies: list[Study]) -> None:
     )
     for study in studies:
         head, *rows = study.wants_rows()
-        page.add(table(head, rows))
+        page.add(markdown(head, rows))
     page.picture("limits-of-all.png", "Errors of all these, with the slope that they should have.", "convergence.csv")
     page.add(
         "## The motion",
@@ -106,4 +107,4 @@ def _own_headings(page: Page) -> None:
 def _of_file(path: Path) -> str:
     with path.open(newline="", encoding="utf-8") as file:
         head, *rows = csv.reader(file)
-    return table(head, rows)
+    return markdown(head, rows)

@@ -1,7 +1,6 @@
 """A page of results: paragraphs, tables and pictures, in Markdown and as HTML that contains its pictures."""
 
 import base64
-import csv
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -11,6 +10,8 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from compare.tables import write_csv
 
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -59,8 +60,7 @@ class Page:
         name = f"report_{name}"
         picture = drawn if isinstance(drawn, Figure) else drawn.figure
         picture.savefig(self.folder / f"{name}.png", dpi=110)  # type: ignore[union-attr]
-        with (self.folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(chain([columns], rows))
+        write_csv(self.folder / f"{name}.csv", chain([columns], rows))
         self.add(f"![{caption}]({name}.png)", f"{caption} Data: [{name}.csv]({name}.csv).")
 
     def picture(self, name: str, caption: str, *data: str) -> None:
@@ -80,9 +80,3 @@ class Page:
 
         body = MarkdownIt("commonmark", {"html": False}).enable("table").render(self.markdown())
         return PAGE.format(title=title, body=re.sub(r'src="([^":]+\.png)"', inlined, body))
-
-
-def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table in Markdown."""
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)

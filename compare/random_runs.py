@@ -23,6 +23,7 @@ import numpy as np
 
 from compare.lump import lump
 from compare.sweeps import Result, sweep
+from compare.tables import markdown
 from compare.trust import FRAMES, KNOWN, TimeUp, at_most, cases_of, scene_of
 from compare.trust_table import LEAST, MOST, OUTCOMES, Row, Trust
 from discs import Gauss8, Problem, SimulationError, Solution, checks, simulate
@@ -133,10 +134,9 @@ class Runs(Trust):
         """Counts and quantiles by tolerance; exceeded tolerances, refusals and cautious estimates; in Markdown."""
         ratios = "estimate/error: least", "median", "90 %", "largest"
         head = ("tol", *OUTCOMES, *ratios, "limited", "tol/error: median", "s: median", "largest")
-        lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
-        for most in range(-2, -8, -1):
-            lines.append(_line(f"1e{most} … 1e{most - 1}", [r for r in self.rows if 10.0 ** (most - 1) < r.tol <= 10.0**most]))
-        lines += [_line("all", self.rows), ""]
+        decades = {f"1e{most} … 1e{most - 1}": (10.0 ** (most - 1), 10.0**most) for most in range(-2, -8, -1)}
+        counted = [_line(name, [r for r in self.rows if low < r.tol <= high]) for name, (low, high) in decades.items()]
+        lines = [markdown(head, [*counted, _line("all", self.rows)]), ""]
         share = np.mean(_ratios(self.rows) <= HIGH)
         lines.append(f"Of runs that only their tolerance limits {share:.1%} have estimates of at most {HIGH:g} times the error.\n")
         for r in self.rows:
@@ -151,7 +151,7 @@ class Runs(Trust):
         return "\n".join(lines)
 
 
-def _line(name: str, rows: list[Row]) -> str:
+def _line(name: str, rows: list[Row]) -> list[str]:
     """A line of the summary. Ratios are those of runs that only their tolerance limits."""
     counts = [str(sum(r.outcome == outcome for r in rows)) for outcome in OUTCOMES]
     ratios = _ratios(rows)
@@ -160,7 +160,7 @@ def _line(name: str, rows: list[Row]) -> str:
     seconds = np.array([r.seconds for r in rows] or [np.nan])
     quantiles = [f"{np.quantile(ratios, p):.2g}" for p in (0.0, 0.5, 0.9, 1.0)]
     more = [str(limited), f"{np.median(spare):.2g}", f"{np.median(seconds):.2g}", f"{seconds.max():.2g}"]
-    return "| " + " | ".join([name, *counts, *quantiles, *more]) + " |"
+    return [name, *counts, *quantiles, *more]
 
 
 def _ratios(rows: Iterable[Row]) -> Float:

@@ -19,12 +19,13 @@ from compare.limit_figures import limits_of_all
 from compare.lump import lump
 from compare.main_job import INSTANTS, LONG, energy_runs
 from compare.outputs import fresh_files
-from compare.page import Page, table
+from compare.page import Page
 from compare.peers import reduced
 from compare.peers.peer import Peer
 from compare.precision import work_precision
 from compare.results import Study
 from compare.study import convergence
+from compare.tables import markdown
 from continuum import Scene, solve, untwisting_rod
 from discs import Problem, Solution, checks
 from discs.analysis import Growth, growth
@@ -128,7 +129,7 @@ def _scene(page: Page, scene: Scene) -> None:
         "N vertical discs roll on a plane without sliding, joined by springs that resist bending and torsion. As N grows they "
         f"become the nonholonomic Cosserat rod of J. Vankerschaver. The scene of this page is the {scene.name}{twisted}.",
         "## The scene",
-        table(("quantity", "value"), values),
+        markdown(("quantity", "value"), values),
         f"Time runs to {scene.duration:g}. The laws of rolling: {'; '.join(f'{law}, {words}' for law, words in LAWS.items())}.",
     )
 
@@ -158,7 +159,7 @@ def _limit(page: Page, studies: dict[str, list[Study]]) -> None:
     for law, pair in studies.items():
         rows = [row for study in pair for row in study.rows()]
         page.figure(f"convergence_{law}", figures.convergence(pair), f"Errors of N discs, {law} law.", pair[0].columns, rows)
-        page.add(table(pair[0].columns, rows))
+        page.add(markdown(pair[0].columns, rows))
 
 
 def _of_the_ground(scene: Scene, n: tuple[int, ...], tol: float) -> Study:
@@ -174,7 +175,7 @@ def _ground(page: Page, study: Study) -> None:
         "the largest value; ± is the spread of the last three orders.",
     )
     page.figure("ground", limits_of_all([study])[0], "Errors of the ground's force on N discs.", columns, rows)
-    page.add(table(columns, rows))
+    page.add(markdown(columns, rows))
 
 
 def _laws(page: Page, fields: dict[str, Solution]) -> None:
@@ -228,7 +229,7 @@ def _horizon(page: Page, found: Growth, duration: float, n: int) -> None:
         f"Errors of the start, in positions over the length of the chain and in angles, are {end:.3g} times as large at "
         f"t = {duration:g}, N = {n}. From its horizon on a run to a tolerance means nothing: an error of that size at the start "
         "has grown to 1.",
-        table(("tolerance", "horizon"), [(tol, f"t = {t:.3g}" if t < np.inf else f"after t = {last:.3g}") for tol, t in times]),
+        markdown(("tolerance", "horizon"), [(tol, f"t = {t:.3g}" if t < np.inf else f"after t = {last:.3g}") for tol, t in times]),
     )
 
 
@@ -251,7 +252,7 @@ def _machine(page: Page) -> None:
         ("Python", platform.python_version()),
         ("machine", f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"),
     ]
-    page.add("## Made with", table(("what", "version"), [*system, *versions]))
+    page.add("## Made with", markdown(("what", "version"), [*system, *versions]))
 
 
 def _installed(name: str) -> bool:

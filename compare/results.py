@@ -1,12 +1,12 @@
 """What comparisons return: tables, as text and CSV. Their pictures stand above this module, and are imported when wanted."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from compare import tables
 from continuum import Scene
 from discs.arrays import Float, Int
 
@@ -85,12 +85,12 @@ class Study:
 
     def table(self) -> str:
         """The table, aligned for a terminal, and that of wanted quantities."""
-        text = format_table([self.columns, *self.rows()])
+        text = tables.aligned([self.columns, *self.rows()])
         return f"{text}\n\n{self.wants_table()}" if self.names else text
 
     def wants_table(self) -> str:
         """The table of wanted quantities, aligned for a terminal."""
-        return format_table(self.wants_rows())
+        return tables.aligned(self.wants_rows())
 
     def wants_rows(self) -> list[tuple[str, ...]]:
         """Its heading, and a row for each quantity: errors, order ± spread, estimated error of the field.
@@ -171,17 +171,9 @@ def compared(scene: Scene) -> tuple[str, ...]:
     return ("x", "y", "theta", "phi") if scene.steered else ("x", "y", "theta")
 
 
-def write_csv(path: Path, studies: list[Study]) -> None:
+def write_studies(path: Path, studies: list[Study]) -> None:
     """The table of several studies as CSV."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([_columns(studies[0].fields), *(row for study in studies for row in study.rows(every=True))])
-
-
-def format_table(rows: list[tuple[str, ...]]) -> str:
-    """Rows of text as aligned columns, the first row the heading."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in rows]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+    tables.write_csv(path, [_columns(studies[0].fields), *(row for study in studies for row in study.rows(every=True))])
 
 
 class Growth(NamedTuple):

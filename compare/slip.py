@@ -12,7 +12,6 @@ balances r./epsilon, so the layer is (K epsilon T)**(1/4) long at times T; a cou
 slip at the end falls like epsilon**(1/2) only, while that inside falls like epsilon. A ring has no ends and is the control.
 """
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +19,9 @@ from tqdm import tqdm
 
 from compare.lump import lump
 from compare.outputs import fresh_files
-from compare.results import Slips, format_table
+from compare.results import Slips
 from compare.study import apart
+from compare.tables import aligned, write_csv
 from continuum import Scene, breathing_ring, solve, untwisting_rod
 from discs import Solution, simulate
 from discs.mechanics.ground import inner
@@ -91,7 +91,6 @@ def slip_limits(
         scenes = untwisting_rod(duration=DURATION), breathing_ring()
         found = [slips(scene, n, epsilon, progress) for scene in scenes]
         rows = [COLUMNS, *(row for each in found for row in each.rows())]
-        with (folder / "slip.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(rows)
+        write_csv(folder / "slip.csv", rows)
         figures.save(figures.slip(found)[0], folder / "slip.png")
-    return format_table(rows), found
+    return aligned(rows), found

@@ -1,6 +1,5 @@
 """The table of `compare.trust`: tolerances, errors and estimates of random scenes."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import shorten
@@ -9,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compare.sweeps import Result
+from compare.tables import markdown, write_csv
 
 OUTCOMES = ("within", "ABOVE", "refused", "cut off", "no reference")
 LEAST = 5.0  # the error of a reference is at most the tolerance over this
@@ -80,21 +80,22 @@ class Trust:
             "ratio",
             "s",
             "reference",
+            "says",
         )
-        lines = ["| " + " | ".join(head) + " | says |", "| --- " * (len(head) + 1) + "|"]
+        lines = []
         for r in self.rows:
             numbers = [_shown(v) for v in (r.error, r.estimate)]
             ratio = f"{r.ratio:.2g}" if np.isfinite(r.ratio) else "–"
             reference = f"{r.reference} {r.reference_error:.0e}" if r.reference else "–"
             says = shorten("; ".join(filter(None, [r.says, r.shown])), 300).replace("|", "\\|")
             cells = (r.scene, r.kind, r.law, r.words.replace("|", "\\|"), f"{r.duration:.3g}", r.by, f"{r.tol:.1e}", r.outcome)
-            lines.append("| " + " | ".join([*cells, *numbers, ratio, f"{r.seconds:.2g}", reference, says]) + " |")
-        return "\n".join(lines)
+            lines.append([*cells, *numbers, ratio, f"{r.seconds:.2g}", reference, says])
+        return markdown(head, lines)
 
     def summary(self) -> str:
         """Counts, quantiles of estimate over error, and exceeded tolerances, as a table in Markdown."""
         head = ("", *OUTCOMES, "estimate/error: least", "median", "90 %", "largest", "tol/error: median", "s: median", "largest")
-        lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
+        counted = []
         for by in ("solve", "simulate"):
             rows = self.of(by)
             counts = [str(sum(r.outcome == outcome for r in rows)) for outcome in OUTCOMES]
@@ -103,7 +104,8 @@ class Trust:
             seconds = np.array([r.seconds for r in rows] or [np.nan])
             quantiles = [f"{np.quantile(ratios, p):.2g}" for p in (0.0, 0.5, 0.9, 1.0)]
             cells = [by, *counts, *quantiles, f"{np.median(spare):.2g}", f"{np.median(seconds):.2g}", f"{seconds.max():.2g}"]
-            lines.append("| " + " | ".join(cells) + " |")
+            counted.append(cells)
+        lines = [markdown(head, counted)]
         kinds = {r.reference for r in self.rows if r.reference}
         lines.append("\nReferences: " + ", ".join(f"{k} {sum(r.reference == k for r in self.rows)}" for k in sorted(kinds)) + ".")
         for r in self.rows:
@@ -121,10 +123,7 @@ class Trust:
 
     def save(self, path: str | Path) -> None:
         """Write all rows to a CSV file."""
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(Row._fields)
-            writer.writerows(self.rows)
+        write_csv(path, [Row._fields, *self.rows])
 
 
 def _shown(value: float) -> str:

@@ -1,6 +1,5 @@
 """What comparisons of speed against error return."""
 
-import csv
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from compare.tables import markdown, write_csv
 from discs.arrays import Float
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class WorkPrecision:
 
     def speedups(self, errors: Iterable[float] = ERRORS, rms: bool = False) -> str:
         """Ratio of times, fastest peer over ours, at each of `errors` (the largest ones, with `rms` in the 2-norm), as a table."""
-        lines = ["| problem | N | error | ours | | fastest peer | | times |", "| --- " * 8 + "|"]
+        lines = []
         for problem, n in self.problems:
             for error in errors:
                 (ours, mine), (peers, other) = (self.time_at(error, problem, n, whose, rms) for whose in (True, False))
@@ -110,21 +110,17 @@ class WorkPrecision:
                     continue
                 ratio = f"{peers / ours:{'.0f' if peers > ours else '.2f'}}" if np.isfinite(peers) else "no peer"
                 there = f"{1e3 * peers:.3g} ms" if np.isfinite(peers) else "–"
-                lines.append(
-                    f"| {problem} | {n} | {error:.0e} | {mine} | {1e3 * ours:.3g} ms | {other or '–'} | {there} | {ratio} |"
-                )
-        return "\n".join(lines)
+                lines.append([problem, n, f"{error:.0e}", mine, f"{1e3 * ours:.3g} ms", other or "–", there, ratio])
+        return markdown(["problem", "N", "error", "ours", "", "fastest peer", "", "times"], lines)
 
     def table(self) -> str:
         """All runs, as a table."""
-        lines = ["| problem | N | method | setting | error | ms | steps | gradients | solves | remark |", "| --- " * 10 + "|"]
+        lines = []
         for r in self.rows:
-            counts = " | ".join("–" if c is None else str(c) for c in (r.steps, r.gradients, r.solves))
+            counts = ["–" if c is None else c for c in (r.steps, r.gradients, r.solves)]
             error = f"{r.error:.1e}" if np.isfinite(r.error) else "–"
-            lines.append(
-                f"| {r.problem} | {r.n} | {r.method} | {r.setting:.3g} | {error} | {1e3 * r.seconds:.3g} | {counts} | {r.remark} |"
-            )
-        return "\n".join(lines)
+            lines.append([r.problem, r.n, r.method, f"{r.setting:.3g}", error, f"{1e3 * r.seconds:.3g}", *counts, r.remark])
+        return markdown(["problem", "N", "method", "setting", "error", "ms", "steps", "gradients", "solves", "remark"], lines)
 
     def report(self) -> str:
         """Speedups, what differs, and all runs, in Markdown."""
@@ -146,10 +142,7 @@ class WorkPrecision:
 
     def save(self, path: str | Path) -> None:
         """All runs, as CSV."""
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(Row._fields)
-            writer.writerows(self.rows)
+        write_csv(path, [Row._fields, *self.rows])
 
     def plot(self, path: str | Path | None = None) -> "Sequence[Axes]":
         """Error against time, a panel for each problem; saved if a path is given."""

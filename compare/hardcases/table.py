@@ -1,6 +1,5 @@
 """One table of every hard case by every method."""
 
-import csv
 from collections.abc import Iterable
 from concurrent.futures import Executor
 from contextlib import nullcontext
@@ -18,6 +17,7 @@ from compare.hardcases.problems import rolling_waves
 from compare.hardcases.runs import OURS, PEERS, RTOL, TOL, WRONG, Found
 from compare.results import Growth
 from compare.sweeps import Result, read, sweep
+from compare.tables import markdown, write_csv
 from discs import checks
 from discs.running.tolerance import USUAL
 
@@ -94,18 +94,18 @@ class Stability:
         """Cases by methods, as a table in Markdown; bold marks failures of ours."""
         at = {(row.case, row.setting, row.method): row for row in self.rows}
         methods = [m for m in (*OURS, *PEERS) if any(row.method == m for row in self.rows)]
-        lines = [f"| case | {' | '.join(methods)} |", "| --- " * (len(methods) + 1) + "|"]
+        lines = []
         for case in self.cases:
             cells = [_cell(at.get((case.name, case.setting, m))) for m in methods]
             if any(cell != "·" for cell in cells):
-                lines.append(f"| {case.name}: {case.setting} | {' | '.join(cells)} |")
-        return "\n".join(lines)
+                lines.append([f"{case.name}: {case.setting}", *cells])
+        return markdown(["case", *methods], lines)
 
     def table(self) -> str:
         """All runs, as a table in Markdown."""
         words = "case", "method", "as expected", "result", "t", "h", "error", "off", "energy", "slip"
         head = (*words, "unconverged", "steps", "s", "remark")
-        lines = [f"| {' | '.join(head)} |", "| --- " * len(head) + "|"]
+        lines = []
         for row in self.rows:
             f = row.found
             numbers = [_short(v) for v in (f.t, f.dt, f.error, f.off, f.energy, f.residual)]
@@ -119,8 +119,8 @@ class Stability:
                 str(f.unconverged),
                 str(f.steps),
             ]
-            lines.append(f"| {' | '.join([*cells, _short(f.seconds), says])} |")
-        return "\n".join(lines)
+            lines.append([*cells, _short(f.seconds), says])
+        return markdown(head, lines)
 
     def summary(self) -> str:
         """Failures of ours, in lines of Markdown."""
@@ -156,10 +156,7 @@ class Stability:
 
     def save(self, path: str | Path) -> None:
         """All runs, as CSV."""
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow([*Row._fields[:-1], *Found._fields])
-            writer.writerows([*row[:-1], *row.found] for row in self.rows)
+        write_csv(path, [[*Row._fields[:-1], *Found._fields], *([*row[:-1], *row.found] for row in self.rows)])
 
     @cached_property
     def waves(self) -> dict[str, Growth]:

@@ -9,7 +9,7 @@ import pytest
 
 from compare import convergence, lump
 from compare.load_limits import fitting_twist
-from compare.results import Study, write_csv
+from compare.results import Study, write_studies
 from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
 from discs import Gauss8, simulate
 from discs.loads import Damping, Rest, Slope
@@ -119,7 +119,7 @@ def test_rings_need_no_ends(rolling, tmp_path):
 def test_table_and_csv_hold_the_same(paper_field, tmp_path):
     scene = untwisting_rod()
     studies = [convergence(scene, (9, 17), ends, field=paper_field, progress=False) for ends in ("springs", "consistent")]
-    write_csv(tmp_path / "table.csv", studies)
+    write_studies(tmp_path / "table.csv", studies)
     with (tmp_path / "table.csv").open() as file:
         rows = list(csv.reader(file))
     assert tuple(rows[0]) == studies[0].columns
