@@ -70,7 +70,7 @@ class SteeredTerms(Terms):
 
 @singledispatch
 def put(load: Any, to: SteeredTerms) -> None:
-    """Add a load to the terms. Loads without a form of their own here have that of `continuum.load_terms`."""
+    """Add a load to the terms, by its form here or that of `continuum.load_terms`; ValueError for a load that has neither."""
     if add.dispatch(type(load)) is add.dispatch(object):
         raise ValueError(f"{type(load).__name__}: a field has no form of it; simulate(lump(scene, n)) takes it on discs")
     add(load, to)

@@ -106,7 +106,7 @@ class Watch:
 
 
 def run(chain: Chain, start: Start, h: float, times: Float, bar: tqdm) -> Run:
-    """The motion at the given times, in steps h."""
+    """The motion at the given times, in steps h. ValueError or SimulationError for a step that cannot be taken."""
     r, v, theta, omega = (given.at(chain.s) if given.nodes.shape[1] != chain.n else given.nodes for given in start)
     system = FreeRod(chain, r)
     try:

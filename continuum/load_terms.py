@@ -70,7 +70,7 @@ class Terms:
         return read(f"{name} of {type(load).__name__}", getattr(load, name), self.s, least)
 
     def shared(self, load: Any, name: str, least: float | None = None) -> Float:
-        """A pattern times the weights, (S,), or the number at the place of a point load."""
+        """A pattern times the weights, (S,), or the number at the place of a point load; ValueError for a pattern there."""
         values = self.at(load, name, least)
         if load.at is None:
             return self.w * values
@@ -81,7 +81,7 @@ class Terms:
         return shared
 
     def row(self, load: Any) -> int:
-        """The row of the angle that a load is about."""
+        """The row of the angle that a load is about; ValueError for "turn", as headings follow the line here."""
         if load.about != "roll":
             name = type(load).__name__
             raise ValueError(f"{name}: about={load.about!r} is for rods with headings of their own; here they follow the line")

@@ -58,7 +58,7 @@ class Rod:
     stretch_stiffness: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        _settle(
+        _check_and_store(
             self, ("length", "density", "radius", "spin_inertia", "torsion_stiffness", "bending_stiffness", "stretch_stiffness")
         )
         if not self.varying and not self.inertia:
@@ -112,14 +112,14 @@ class SteeredRod(Rod):
     curvature: str = "true"
 
     def __post_init__(self) -> None:
-        _settle(self, ("length", "shear_stiffness", "heading_inertia"))
+        _check_and_store(self, ("length", "shear_stiffness", "heading_inertia"))
         super().__post_init__()
 
     def _check_law(self) -> None:
         checks.choice("curvature (own headings)", self.curvature, ("true",))
 
 
-def _settle(rod: Rod, names: tuple[str, ...]) -> None:
+def _check_and_store(rod: Rod, names: tuple[str, ...]) -> None:
     """Check parameters that are numbers and store them as floats; functions of s are checked when they are read."""
     for name in names:
         given = getattr(rod, name)

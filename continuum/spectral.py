@@ -102,7 +102,7 @@ class Search:
         self._pair: tuple[Motion, Motion] | None = None
 
     def result(self) -> Motion:
-        """A motion within the bounds."""
+        """A motion within the bounds. ValueError, with a hint at the cause, if none is found."""
         tol = min(self._bound.values())
         start = sum(tol < below for below in self._plan.more)
         sizes = (SIZES + MORE)[min(start, len(SIZES) - 2) :]
@@ -201,7 +201,7 @@ class Search:
 
 
 def solve_spectral(scene: Scene, bound: Mapping[str, float], times: Float, progress: bool, want: tuple[str, ...] = ()) -> Solution:
-    """The fields of a scene with slaved headings at `times` (F,), within bounds by name; see `continuum.solve`."""
+    """The fields of a scene with slaved headings at `times` (F,), within bounds by name; see `continuum.solve`, for errors too."""
     with (
         tqdm(desc=f"field to {min(bound.values()):g}", unit="run", delay=1, disable=not progress) as bar,
         np.errstate(over="ignore", invalid="ignore", divide="ignore"),

@@ -134,7 +134,7 @@ def called(name: str, function: Callable[..., Any], *arguments: Any, where: str 
 def field(
     name: str, value: ArrayLike, size: int, *, least: float | None = None, strict: bool = False, places: Float | None = None
 ) -> Float:
-    """Return `value` as a read-only float array (size,), a single number being repeated but stored once.
+    """Return `value` as a read-only float array (size,), a single number being repeated but stored once, else raise ValueError.
 
     With `least`, every entry must be at least that, or larger if `strict`. `places` (size,) along a rod are for messages.
     """
@@ -165,7 +165,7 @@ def vector(name: str, value: ArrayLike, size: int) -> Float:
 
 
 def iteration(sweeps: object, tolerance: object) -> None:
-    """Check the limits of an iteration: at least one sweep, a tolerance that is not negative."""
+    """ValueError unless an iteration has at least one sweep, and a tolerance that is not negative."""
     whole("sweeps", sweeps, 1)
     if number("tolerance", tolerance) < 0:
         raise ValueError(f"tolerance must be at least 0; got {shown(tolerance)}")

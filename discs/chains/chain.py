@@ -117,7 +117,7 @@ class Chain(Spaced):
         object.__setattr__(self, "n", n)
         checks.fits(f"n = {n} discs", FIELDS * n)
         joints = n - (self.ends != "ring")
-        _settle(
+        _check_and_store(
             self,
             density=(n, True),
             spin_inertia=(n, False),
@@ -203,7 +203,7 @@ class SteeredChain(Spaced):
         object.__setattr__(self, "n", n)
         checks.fits(f"n = {n} discs", FIELDS * n)
         links = n - (self.ends != "ring")
-        _settle(
+        _check_and_store(
             self,
             density=(n, True),
             spin_inertia=(n, False),
@@ -219,7 +219,7 @@ class SteeredChain(Spaced):
             raise ValueError(f"turns of the heading are counted around a ring; with ends={self.ends!r} it must be 0")
 
 
-def _settle(chain: "Chain | SteeredChain", **ranges: tuple[int, bool]) -> None:
+def _check_and_store(chain: "Chain | SteeredChain", **ranges: tuple[int, bool]) -> None:
     """Check length, shift and the parameters (each with its size, and whether it must be positive), and store them as arrays."""
     object.__setattr__(chain, "length", checks.number("length", chain.length, positive=True))
     if not SHORTEST < chain.k < 1 / SHORTEST:

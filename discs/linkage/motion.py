@@ -32,7 +32,7 @@ def run(
     """A run by the midpoint rule with the step dt or, without dt, with steps halved until their error is within tol (1e-4).
 
     The error is that of x, y relative to the length, and of theta and phi in rad, at the frames: a third of the difference of two
-    runs. Other arguments and errors are those of `discs.simulate`.
+    runs. Other arguments and errors (ValueError, SimulationError) are those of `discs.simulate`.
     """
     if not (method is None or (isinstance(method, str) and method in ("midpoint", "auto"))):
         raise ValueError(f"a linkage runs by 'midpoint', which takes rigid links; got method={checks.shown(method)}")

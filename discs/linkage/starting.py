@@ -65,7 +65,7 @@ def response(of: Equations, q: Float, w: Float, t: float) -> tuple[Float, Float]
 
 
 def nearest(linkage: Linkage, state: LinkageState) -> LinkageState:
-    """The state near the given one that obeys rigid links, wheels and what is held, by Newton's method."""
+    """The state near the given one that obeys rigid links, wheels and what is held, by Newton's method; ValueError if none is."""
     of = Equations(linkage)
     q = np.array([state.x, state.y, state.theta, state.phi], dtype=float)
     rates = np.array([state.x_rate, state.y_rate, state.phi_rate], dtype=float)

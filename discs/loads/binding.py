@@ -107,7 +107,7 @@ def spread(chain: Discs, rows: Mapping[int, ArrayLike]) -> Float:
 
 
 def signal_of(name: str, signal: Signal | None) -> Signal:
-    """The signal of a load, 1 for None."""
+    """The signal of a load, 1 for None; ValueError for what is no function."""
     if signal is None:
         return steady()
     if not callable(signal):

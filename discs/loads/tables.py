@@ -69,7 +69,7 @@ def load_of_words(words: Sequence[str]) -> OnRod:
 
 
 def named(key: str, table: Any, known: Mapping[str, Any], folder: Path | None) -> Any:
-    """A signal, or a parameter of the rod that varies, from its table."""
+    """A signal, or a parameter of the rod that varies, from its table; ValueError for another one."""
     if not isinstance(table, dict) or "name" not in table:
         raise ValueError(
             f'{key} must be a table with its name, as {{ name = "{next(iter(known))}", ... }}; got {checks.shown(table)}'

@@ -1,6 +1,7 @@
 r"""Textbook systems with drives, whose constraints are affine, A(q) v = b(t, q): `Textbook`s with closed forms.
 
-The reaction of a drive does work, so energy is not conserved: energy - energy[0] = work + reaction_work.
+The reaction of a drive does work, so energy is not conserved: energy - energy[0] = work + reaction_work. Each function raises
+ValueError for a parameter outside its range, and for one that must not be 0.
 
 * J. I. Neimark, N. A. Fufaev, Dynamics of Nonholonomic Systems, AMS 1972;
 * K. Weltner, Stable circular orbits of freely moving balls on rotating discs, Am. J. Phys. 47 (1979) 984-986.

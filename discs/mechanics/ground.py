@@ -137,7 +137,10 @@ def _warn_if_rough(values: Float, errors: Float, least: tuple[float, float], n: 
 
 
 def inner(run: Solution) -> NDArray[np.bool_]:
-    """Which discs are away from free ends by an eighth of the length or more, (n,) of booleans; all of a ring."""
+    """Which discs are away from free ends by an eighth of the length or more, (n,) of booleans; all of a ring.
+
+    ValueError for a field.
+    """
     chain = None if run.problem is None else run.problem.chain
     if chain is None:
         raise ValueError("a run of discs is needed; got a field, whose contact_force is the force per length inside it")

@@ -11,7 +11,7 @@ from discs.mechanics.derivatives import Formula
 
 
 def function_of(arguments: str, name: str, given: Any) -> Callable[..., Any]:
-    """`given`, which must be a function of the `arguments`, as "t, q", and of nothing else."""
+    """Return `given` if it is a function of the `arguments`, as "t, q", and of nothing else, else raise ValueError."""
     if not callable(given):
         raise ValueError(f"{name} must be a function of {arguments}; got {given!r}")
     names = arguments.split(", ")

@@ -36,7 +36,7 @@ class Textbook:
     def integrate(self, times: ArrayLike, rtol: float = 1e-11, **options: Any) -> Trajectory:
         """The motion from the initial state at t = 0, at increasing times (F,), which may be negative.
 
-        `options` as of `MechanicalSystem.integrate`.
+        `options` and errors as of `MechanicalSystem.integrate`; ValueError for times that do not increase.
         """
         t = np.atleast_1d(checks.array("times", times))
         if t.ndim != 1 or not t.size or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
@@ -77,7 +77,7 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
 
 
 def nonzero(name: str, value: float, why: str) -> float:
-    """A parameter that must be finite and not 0; `why` says what the system would be with 0."""
+    """Return a parameter that is finite and not 0, else raise ValueError; `why` says what the system would be with 0."""
     if checks.number(name, value) == 0:
         raise ValueError(f"{name} must not be 0 ({why}); got {checks.shown(value)}")
     return float(value)

@@ -74,7 +74,7 @@ def integrate(
     progress: bool,
     max_step: float | None = None,
 ) -> Trajectory:
-    """`MechanicalSystem.integrate` for q, v and mu that are checked."""
+    """`MechanicalSystem.integrate`, with its errors, for q, v and mu that are checked."""
     t = np.atleast_1d(checks.array("times", times))
     if t.ndim != 1 or t.size < 2 or not np.isfinite(t).all() or not (np.all(np.diff(t) > 0) or np.all(np.diff(t) < 0)):
         raise ValueError("times must be at least two, all increasing or all decreasing; the first is that of q and v")

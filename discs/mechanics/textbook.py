@@ -8,6 +8,8 @@ term and the forces along the direction the first.
 * J. I. Neimark, N. A. Fufaev, Dynamics of Nonholonomic Systems, AMS 1972: knife edge, disc, sleigh;
 * A. M. Bloch, Nonholonomic Mechanics and Control, 2nd ed., Springer 2015, chapter 1: the same, and the particle.
 
+Each raises ValueError for a parameter outside its range, and for one that must not be 0.
+
 Oscillators that drive each other are in `discs.mechanics.oscillators`.
 """
 

@@ -47,7 +47,7 @@ def slopes(run: Solution) -> Float:
 
 
 def axles(run: Solution) -> Float:
-    """Unit vectors d_1 along the axles, (F, 2, N); zero where r' is."""
+    """Unit vectors d_1 along the axles, (F, 2, N); zero where r' is. ValueError for one disc without a heading."""
     if run.phi is not None:
         return np.stack([np.cos(run.phi), np.sin(run.phi)], axis=1)
     if run.s.size == 1:

@@ -44,7 +44,7 @@ class View:
     path: Path | None = None
 
     def save(self, path: str | Path) -> "View":
-        """Write the page to a file, in a folder that exists."""
+        """Write the page to the file `path`; ValueError if its folder does not exist."""
         path = Path(path)
         if not path.parent.is_dir():
             raise ValueError(f"path must be in a folder that exists; got {str(path)!r}")

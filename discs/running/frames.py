@@ -31,7 +31,7 @@ def steps_before(time: float, h: float) -> tuple[int, float]:
 
 
 def frame_times(frames: int | ArrayLike, duration: float) -> Float:
-    """The times of frames, (F,), from their number or their times; see `simulate`.
+    """The times of frames, (F,), from their number or their times, see `simulate`; ValueError for others.
 
     A time beyond the duration by no more than rounding counts as its end: `np.arange(0, 0.35, 0.1)` ends just above 0.3.
     """

@@ -120,7 +120,10 @@ class _Step(NamedTuple):
 
 
 def by_steps(problem: Problem, integrator: Integrator, dt: float | None, engine: str | None, end: float) -> Iterator[_Step]:
-    """The steps of a run to a time `end`; the last one is shorter if `end` lies between two steps."""
+    """The steps of a run to a time `end`; the last one is shorter if `end` lies between two steps.
+
+    ValueError as of `steps`.
+    """
     if integrator.adaptive:
         raise ValueError(
             f"a run by steps, or with events, needs a method with fixed steps, as 'midpoint' or 'gauss6'; {integrator.name!r} "
