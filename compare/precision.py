@@ -5,8 +5,8 @@ Times are processor time, which other work on the machine changes little.
 
 import time as clock
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -117,25 +117,18 @@ class _Entry:
 
     def run_again(self, limit: float) -> None:
         """Run twice: to warm up, and timed."""
-        with suppress(Cutoff, *FAILURES), _quiet():
+        with suppress(Cutoff, *FAILURES), warnings.catch_warnings(action="ignore"):
             self.peer.run(self.row.setting, limit)
             self.times.append(self.peer.run(self.row.setting, limit).seconds)
 
     def run_once_more(self, limit: float) -> None:
         """Run once, timed; the first run counts too."""
         self.times.append(self.row.seconds)
-        with suppress(Cutoff, *FAILURES), _quiet():
+        with suppress(Cutoff, *FAILURES), warnings.catch_warnings(action="ignore"):
             self.times.append(self.peer.run(self.row.setting, limit).seconds)
 
     def result(self) -> Row:
         return self.row._replace(seconds=float(np.median(self.times))) if self.times else self.row
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
 
 
 def _first_runs(peer: Peer, blank: Row, exact: Float, limit: float) -> list[_Entry]:
@@ -150,7 +143,7 @@ def _first_runs(peer: Peer, blank: Row, exact: Float, limit: float) -> list[_Ent
         begun = clock.process_time()
         row, more = blank._replace(setting=setting), setting != peer.settings[-1]
         try:
-            with _quiet():
+            with warnings.catch_warnings(action="ignore"):
                 found = peer.run(setting, limit)
                 if not entries:  # loading and compiling are not part of a method's time
                     started = clock.process_time()

@@ -55,8 +55,7 @@ def random_problem(seed: int, index: int, loads: bool = False) -> tuple[Problem,
         scene, n, law = replace(scene, rod=rod, duration=min(scene.duration, TRUE_DURATION)), min(n, TRUE_SIZE), "true"
         ends = "springs" if ends == "paper" else ends
     n, tol = max(n, 5 if scene.closed else 4 if ends == "consistent" else 3), float(f"{10 ** -rng.uniform(2, 8):.1e}")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # few discs do not resolve every scene
+    with warnings.catch_warnings(action="ignore"):  # few discs do not resolve every scene
         problem = lump(scene, n, ends)
     words = f"{drawn.words}, N = {n}, {problem.chain.ends}"
     return problem, tol, Row(f"{seed}:{index}", drawn.kind, law, words, scene.duration, "simulate", tol, "")
@@ -66,8 +65,7 @@ def examine(case: list[float]) -> list[Any]:
     """The row of a case (`compare.trust.cases_of`); called in other processes."""
     problem, tol, row = random_problem(int(case[0]), int(case[1]), len(case) > 3)
     seconds, found = float(case[2]), None
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         for method in ("midpoint", "gauss6", "gauss8", "DOP853"):  # compile or load kernels before time is measured
             simulate(replace(problem, duration=MOMENT), method, MOMENT, 1, progress=False)
         begun = clock.process_time()

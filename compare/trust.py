@@ -101,8 +101,7 @@ def cases_of(seed: int, first: int, count: int, seconds: float, loads: bool) -> 
 @cache
 def _warm_up() -> None:
     """Compile or load the kernels before any time is measured."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         for scene in (untwisting_rod(duration=0.1), steered_rod(duration=0.1), breathing_ring(duration=0.1)):
             solve(scene, 1e-3, frames=1, progress=False)
             for method in ("midpoint", "gauss6", "gauss8"):
@@ -119,8 +118,7 @@ def field_row(drawn: Drawn, row: Row, seconds: float) -> Row:
     estimate = max((found.error_estimate or {})[name] for name in names)
     row = row._replace(estimate=estimate)
     try:
-        with at_most(2 * seconds), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with at_most(2 * seconds), warnings.catch_warnings(action="ignore"):
             other, off = _chains(scene, names, row.tol)
             error = _apart(scene, found, other, names)
             if off <= row.tol / LEAST:
@@ -154,8 +152,7 @@ def discs_row(drawn: Drawn, row: Row, seconds: float) -> Row:
     row = row._replace(estimate=estimate, limited=found.stats.get("limited_by", ""))
     h = problem.duration / max(round(problem.duration / found.stats["dt"]), 25)
     try:
-        with at_most(4 * seconds), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with at_most(4 * seconds), warnings.catch_warnings(action="ignore"):
             near, far = (simulate(problem, Gauss8(tolerance=1e-14, sweeps=20), h / m, FRAMES, progress=False) for m in (8, 4))
         return _judged(row, apart(found, near), apart(near, far), "gauss8")
     except (TimeUp, ValueError, SimulationError, ArithmeticError) as error:
@@ -230,8 +227,7 @@ def _chains_end(drawn: Drawn, seconds: float) -> str:
     said = []
     for n in (65, 129):
         try:
-            with at_most(seconds / 2), warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with at_most(seconds / 2), warnings.catch_warnings(action="ignore"):
                 problem = lump(drawn.scene, n, "springs" if drawn.scene.steered else "consistent")
                 dt = min(problem.chain.k / 4, problem.duration / 400)
                 run = simulate(problem, Gauss8(tolerance=1e-12, sweeps=20), dt, 2, progress=False)

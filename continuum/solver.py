@@ -140,8 +140,7 @@ def _richardson(scene: Scene, bound: Mapping[str, float], frames: Float, progres
         return semidiscretise(scene, n - 1 if scene.closed else n, "consistent")
 
     def run(n: int, steps: int) -> Solution:
-        with warnings.catch_warnings():  # too long steps show in the comparison with half as long ones
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):  # too long steps show in the comparison with half as long ones
             return simulate(mesh(n), method, scene.duration / steps, frames, want, progress=False)
 
     def largest(a: Solution, b: Solution, factor: float) -> dict[str, float]:

@@ -153,7 +153,7 @@ def given_loads(options: argparse.Namespace) -> tuple[OnRod, ...]:
 
 
 def clear_way(options: argparse.Namespace, whole: bool) -> None:
-    """Before a run: ValueError if its file cannot be written. Unless it is saved `whole` at its end, it may continue from its file."""
+    """Before a run: ValueError if its file cannot be written. A run that is not saved `whole` at its end may continue from it."""
     if options.overwrite and not options.save:
         raise ValueError("--overwrite goes with --save FILE")
     if not options.save:

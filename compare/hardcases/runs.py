@@ -124,8 +124,7 @@ def reference_of(make: Callable[[], Problem], exact: Callable[[Problem], Float] 
         return exact(problem)
     for steps in (steps for steps in REFERENCES if steps * problem.chain.n <= MOST_WORK):
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with warnings.catch_warnings(action="ignore"):
                 q, floor = reference(problem, steps)
         except SimulationError:
             continue
@@ -234,8 +233,7 @@ def peer(problem: Problem, name: str, seconds: float) -> tuple[Found, Float | No
     system, f = problem.system, Watched(problem, seconds)
     found = reduced.sundials_peers(problem, f) if name.startswith("CVODE") else reduced.scipy_peers(problem, f)
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
             end = next(p for p in found if p.name == name).run(RTOL, np.inf)
     except (Cutoff, ArithmeticError, RuntimeError, ValueError) as error:
         outcome, says = ("cut off", f.gave_up) if f.gave_up else ("failed", str(error))
