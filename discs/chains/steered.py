@@ -267,7 +267,7 @@ class SteeredSystem(RollingDiscs):
         """The same parameters in lanes (`discs.kernels.steered_lanes`), for methods that take them; None for few or very many."""
         if self._degree != 1 or self.parameters is None:
             return None
-        from discs.kernels import lanes, steered_lanes, steered_passes  # noqa: F401, the sweeps
+        from discs.kernels import lanes, steered_lanes, steered_passes, steered_stages  # noqa: F401, the sweeps
 
         fit = steered_lanes.MANY <= self.n <= steered_lanes.MOST and lanes.local(self.parameters.load)
         return steered_lanes.arranged(self.parameters) if fit else None

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.kernels import driver, shared, slaved_stages, steered_passes  # noqa: F401, the sweeps
+from discs.kernels import driver, shared, slaved_stages, steered_passes, steered_stages  # noqa: F401, the sweeps
 from discs.kernels import protocol as do
 from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill

@@ -33,10 +33,10 @@ def _basis(chain, work, move, c):
 
 
 @part
-def frozen(chain, work, tau, p, move, c, to):
-    """The rows x and y of c = C after a move, and tau C p in `to`, (4, n' + 2 HALO)."""
+def frozen(chain, work, tau, p, move, c, to, start):
+    """The rows x and y of c = C after a move, and tau C p in `to` from `start` on; `to` may be `move`."""
     for i in range(0, move.shape[1], LANES):
-        j = HALO + i
+        j = start + i
         x, y = contact(chain, work, i, load(move[3], i))
         roll = tau * load(p[0], i)
         store(c[0], i, x)
@@ -137,7 +137,7 @@ def assemble(chain, work, c, one, g, m):
 @fill(do.sweep, *TURNING)
 def _sweep(chain, work, state, t, h, p, move, first):
     c, b, half, matrix = work.c, work.b, 0.5 * h, pick(work.matrix, 0)
-    frozen(chain, work, half, p, move, c, work.half)
+    frozen(chain, work, half, p, move, c, work.half, HALO)
     pulled(chain, work, c, b, True, first)
     for row in range(2):
         start, mean, to = state.pi[row], p[row], b[row]
