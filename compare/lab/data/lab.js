@@ -7,6 +7,7 @@ function make(name, properties = {}, ...children) {
   const { className, ...rest } = properties, element = document.createElement(name);
   if (className) element.className = className;
   for (const [key, value] of Object.entries(rest)) key in element ? element[key] = value : element.setAttribute(key, value);
+  element.dataset.lmSuppressShortcuts = "true"; // JupyterLab takes no keys that are pressed here
   element.append(...children);
   return element;
 }
@@ -365,8 +366,8 @@ function render({ model, el, whole = false }) {
   copies.forEach((button, j) => { button.onclick = () => { copied.textContent = ""; ask({ kind: "code", language: ["python", "toml"][j] }); }; });
   saves.forEach((button, j) => { button.onclick = () => ask({ kind: "save", ending: [".nc", ".csv"][j] }); });
 
-  // ---- the hand: a disc near the pointer is taken; elsewhere the pointer turns the view
-  let pulling = null;
+  // ---- the hand: a disc near the pointer is pulled, or kicked or held when the pointer is released; elsewhere the pointer turns the view
+  let pulling = null, pointer = null, tapped = null; // the disc that is pulled, the last event of the pointer that pulls, where a click began
   function near(event) {
     if (!stage || !frame || !panels.length) return -1;
     const { left, top } = element.getBoundingClientRect(), [, , width, height] = stage.panel(0);
@@ -382,16 +383,27 @@ function render({ model, el, whole = false }) {
   function drag(event) {
     const { left, top } = element.getBoundingClientRect(), place = stage.under(event.clientX - left, event.clientY - top);
     if (place) latest.set("pull", { kind: "pull", disc: pulling, x: place[0], y: place[1] });
+    pointer = event;
+  }
+  function release() {
+    pulling = null;
+    element.classList.remove("pulls");
+    latest.delete("pull");
+    ask({ kind: "release" });
   }
   element.addEventListener("pointerdown", (event) => {
-    const i = event.isPrimary && event.button === 0 && event.target.tagName === "CANVAS" ? near(event) : -1;
+    tapped = null;
+    if (pulling !== null && !event.isPrimary) { // two fingers zoom, also where the first one is on a disc: the view gets it now
+      release();
+      stage.renderer.domElement.dispatchEvent(new PointerEvent("pointerdown", pointer));
+    }
+    const i = event.isTrusted && event.isPrimary && event.button === 0 && event.target.tagName === "CANVAS" ? near(event) : -1;
     if (i < 0) return;
-    event.stopPropagation();
-    event.preventDefault();
     element.focus({ preventScroll: true, focusVisible: false });
     disc.value = scene.discs[i];
-    if (tool === "kick") return kicked(scene.discs[i]);
-    if (tool === "hold") return held(scene.discs[i]);
+    if (tool !== "pull") { tapped = { number: scene.discs[i], x: event.clientX, y: event.clientY }; return; }
+    event.stopPropagation();
+    event.preventDefault();
     pulling = scene.discs[i];
     element.setPointerCapture(event.pointerId);
     element.classList.add("pulls");
@@ -401,13 +413,14 @@ function render({ model, el, whole = false }) {
     if (pulling !== null) { event.stopPropagation(); return drag(event); }
     if (!event.buttons) element.classList.toggle("near", near(event) >= 0);
   }, true);
+  element.addEventListener("pointerup", (event) => {
+    if (tapped && Math.hypot(event.clientX - tapped.x, event.clientY - tapped.y) < 10) (tool === "kick" ? kicked : held)(tapped.number);
+    tapped = null;
+  }, true);
   for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) element.addEventListener(name, (event) => {
     if (pulling === null) return;
     event.stopPropagation();
-    pulling = null;
-    element.classList.remove("pulls");
-    latest.delete("pull");
-    ask({ kind: "release" });
+    release();
   }, true);
 
   const keys = (event) => {

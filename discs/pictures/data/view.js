@@ -197,7 +197,7 @@
   const size = 10 ** Math.floor(Math.log10((end - start) / 4)), usual = end - start >= 0.9 && end - start <= 40 || end === start;
   const rate = usual ? 1 : [5, 2, 1].map((m) => m * size).find((m) => (end - start) / m >= 4);
   for (const m of [0.25, 0.5, 1, 2, 4]) at("speed").add(new Option(Number((m * rate).toPrecision(3)), m * rate, m === 1, m === 1));
-  globalThis.discs = { panels, camera: stage.camera, go, play }; // for the console
+  globalThis.discs = { panels, camera: stage.camera, orbit: stage.orbit, go, play }; // for the console
   resize();
   legend();
   stage.paint(panels);
