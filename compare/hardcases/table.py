@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 SECONDS = {True: 1.0, False: 60.0}  # limit for a run: quick, or not
 PEER_SECONDS = 2.0  # peers are many, and slow
-MARK = {"lost": "LOST"}
+MARK = {"lost": "LOST"}  # in capitals in the table
 
 
 class Row(NamedTuple):
-    """One method on one case: see `compare.hardcases.runs.Found`. verdict : `Expectation.verdict`. expected : "yes", "NO", or ""
-    for peers and runs without a result."""
+    """One method on one case. found : see `compare.hardcases.runs.Found`. verdict : `Expectation.verdict`. expected : whether the
+    result is the expected one, "yes" or "NO"; "" for peers and for runs without a result."""
 
     case: str
     setting: str
@@ -42,24 +42,24 @@ class Row(NamedTuple):
 
     @property
     def wrong(self) -> bool:
-        """Whether it ran to the end with an error above `WRONG` in positions, angles or energy."""
+        """True if the run reached the end with an error above `WRONG` in positions, angles or energy."""
         f = self.found
         return f.outcome == "done" and (f.off > WRONG or not f.energy <= WRONG)
 
     @property
     def warned(self) -> bool:
-        """Whether the run says that it may be wrong."""
+        """True if the run warned that it may be wrong."""
         return bool(self.found.says or self.found.unconverged)
 
 
 @dataclass(frozen=True, eq=False)
 class Stability:
-    """Hard cases by methods.
+    """The results of all methods on the hard cases.
 
     Attributes
     ----------
     rows : one for each case and method.
-    cases : the cases, in their order.
+    cases : in the order of the table.
     """
 
     rows: list[Row]
@@ -67,23 +67,23 @@ class Stability:
 
     @property
     def failures(self) -> list[Row]:
-        """Runs of ours that did not meet the expectation."""
+        """Runs of our methods that did not end as expected."""
         return [row for row in self.rows if row.expected == "NO"]
 
     @property
     def unsaid(self) -> list[Row]:
-        """Runs of ours that are wrong without a warning, and default runs above their tolerance without one."""
+        """Runs of our methods that are wrong and gave no warning, and default runs above their tolerance that gave none."""
         ours = [row for row in self.rows if row.method in OURS and not row.warned]
         return [row for row in ours if row.wrong or (row.method == "default" and row.found.off > USUAL)]
 
     def promise(self) -> str:
-        """How many runs of ours are wrong, and which of them have no warning, in lines of Markdown."""
+        """The number of wrong runs of our methods, and those of them that gave no warning, in lines of Markdown."""
         ended = [row for row in self.rows if row.method in OURS and row.found.outcome == "done"]
         known, wrong = sum(bool(np.isfinite(row.found.off)) for row in ended), sum(row.wrong for row in ended)
         lines = [
-            f"{len(ended)} runs of ours ran to the end, {known} have a reference. {wrong} are wrong by more than {100 * WRONG:g} % "
-            f"in positions, angles or energy. Of these, and of default runs with an error above {USUAL:g}, {len(self.unsaid)} are "
-            f"without a warning{':' if self.unsaid else '.'}"
+            f"{len(ended)} runs of our methods reached the end. {known} of them can be compared with a reference. {wrong} have an "
+            f"error above {100 * WRONG:g} % in positions, angles or energy. Of these, and of the default runs with an error above "
+            f"{USUAL:g}, {len(self.unsaid)} gave no warning{':' if self.unsaid else '.'}"
         ]
         for row in self.unsaid:
             off = f"error {_short(row.found.off)}, energy {_short(row.found.energy)}"
@@ -91,7 +91,7 @@ class Stability:
         return "\n".join(lines)
 
     def grid(self) -> str:
-        """Cases by methods, as a table in Markdown; bold marks failures of ours."""
+        """A table in Markdown: a row for each case, a column for each method. Failures of our methods are bold."""
         at = {(row.case, row.setting, row.method): row for row in self.rows}
         methods = [m for m in (*OURS, *PEERS) if any(row.method == m for row in self.rows)]
         lines = []
@@ -123,9 +123,9 @@ class Stability:
         return markdown(head, lines)
 
     def summary(self) -> str:
-        """Failures of ours, in lines of Markdown."""
+        """Failures of our methods, in lines of Markdown."""
         told = [r for r in self.rows if r.expected]
-        lines = [f"{len(told)} runs of ours, {len(self.failures)} not as expected{':' if self.failures else '.'}"]
+        lines = [f"{len(told)} runs of our methods, {len(self.failures)} not as expected{':' if self.failures else '.'}"]
         for row in self.failures:
             f = row.found
             how = f"{row.verdict}, error {_short(f.error)}, energy {_short(f.energy)}"
@@ -135,37 +135,44 @@ class Stability:
 
     @property
     def words(self) -> str:
-        """Meaning of the words in the grid."""
-        return (
-            "passed: ran to the end; energy (relative error shown) and, where known, positions within the bound. warned: outside "
-            "the bound, with a warning or unconverged steps. **LOST**: outside the bound, without a warning. stopped: an error "
-            "with time and disc. refused: an error before the start. failed: a peer's error. cut off: predicted to exceed its "
-            "time. †: some steps did not converge. ·: not run, as the case does not apply: a tolerance hides waves and rounding, "
-            "the parasitic mode belongs to the two-step scheme, and Radau methods, which do not keep the energy, are for dampers. "
-            f"Bold: a method of ours that did not meet the expectation. auto runs to {TOL:g}, default is `simulate(problem)` with "
-            f"nothing set, to {USUAL:g}; peers run to rtol {RTOL:g}; the energy of peers is that at the end, and their variables "
-            "satisfy rolling exactly. error: as the case defines it; off: of positions and angles at the end, relative to the "
-            "largest of each in the motion. Seconds are processor time."
+        """The meaning of the words in the tables, in Markdown."""
+        return "\n".join(
+            [
+                "* passed: ran to the end; energy (relative drift shown) and, where known, positions within the bound.",
+                "* warned: outside the bound, with a warning or with steps that did not converge.",
+                "* **LOST**: outside the bound, without a warning.",
+                "* stopped: ended by an error that names the time and the disc. refused: an error before the start.",
+                "* failed: an error of a peer. cut off: it would take longer than its time limit.",
+                "* †: some steps did not converge. Bold: a method of ours that did not end as expected.",
+                "* ·: not run, because the case does not apply. A tolerance hides waves and rounding. Only the two-step scheme has "
+                "the parasitic mode. Radau methods do not keep the energy; they are for dampers.",
+                f'* auto: `simulate(problem, "auto", tol={TOL:g})`. default: `simulate(problem)`, with the tolerance {USUAL:g}. '
+                f"Peers: rtol {RTOL:g}; their energy is that at the end, and their variables satisfy rolling exactly.",
+                "* error: as the case defines it. off: error of positions and angles at the end, relative to the largest value of "
+                "each in the motion. s: seconds of processor time.",
+            ]
         )
 
     def report(self) -> str:
-        """Everything, in Markdown."""
+        """All tables, in Markdown."""
         wants = dict.fromkeys(_wanted(case) for case in self.cases)
         told = [self.promise(), self.summary(), self.words, self.grid()]
         return "\n\n".join(["# Hard cases", *told, "## What is expected", "\n".join(wants), "## All runs", self.table()])
 
     def save(self, path: str | Path) -> None:
-        """All runs, as CSV."""
+        """Write all runs to a CSV file."""
         write_csv(path, [[*Row._fields[:-1], *Found._fields], *([*row[:-1], *row.found] for row in self.rows)])
 
     @cached_property
     def waves(self) -> dict[str, Growth]:
-        """Growth on the rolling straight rod under both laws, by midpoint, for the figure."""
+        """Growth of waves on the straight rolling rod by both laws, with the midpoint method, for the figure."""
         found = {law: rolling_waves(33, law, 0.7, 4.0, "midpoint", np.inf)[1] for law in ("field", "unit")}
         return {law: growth for law, growth in found.items() if growth is not None}
 
     def drifts(self) -> tuple[str, dict[str, list[tuple[float, float, int]]]]:
-        """Of the largest chain with steps above the explicit limit: its size, and by method h/k, drift and unconverged steps."""
+        """Of the largest chain with steps above the explicit limit: its size, and for each method h/k, energy drift and the
+        number of unconverged steps.
+        """
         found: dict[str, dict[str, list[tuple[float, float, int]]]] = {}
         for row in (row for row in self.rows if row.case == "step above the explicit limit"):
             size, step = row.setting.split(", h = ")
@@ -174,7 +181,7 @@ class Stability:
         return list(found.items())[-1] if found else ("", {})
 
     def plot(self, path: str | Path | None = None) -> "list[Axes]":
-        """Energy error against h/k of each method, and the growth of waves; saved if a path is given."""
+        """Plot the energy error of each method against h/k, and the growth of waves. Saved if a path is given."""
         from compare import figures
 
         axes = figures.stability(*self.drifts(), self.waves)
@@ -192,17 +199,18 @@ def stability(
     archive: str | Path | None = None,
     progress: bool = True,
 ) -> Stability:
-    """Run hard cases by every method: steps far above the explicit limit, long times, parasitic modes, growing waves, ill-posed and
-    collapsing motions, rough starts, extreme parameters, few and many discs.
+    """Run every method on hard cases: steps far above the explicit limit, long times, parasitic modes, growing waves, ill-posed
+    motions, a collapse, rough initial states, extreme parameters, few and many discs.
 
     Parameters
     ----------
     quick : small cases only, less than a minute.
-    names : of the cases, as `compare.hardcases.cases` has them; all by default.
-    methods : names of ours and of peers; all by default.
-    seconds : limit of processor time; a run that is predicted to take longer is cut off; 60, or 1 if quick. At most 2 for peers.
+    names : names of cases, as in `compare.hardcases.cases`; all by default.
+    methods : names of our methods and of peers; all by default.
+    seconds : limit of processor time for a run; 60 by default, 1 if quick; at most 2 for peers. A run is cut off if it would take
+        longer.
     executor : as for `sweep`; by default one other process, so that times are comparable.
-    archive : file to keep results in, and to resume from.
+    archive : file that keeps the results; an interrupted call goes on from it.
     progress : show a progress bar.
 
     Raises
@@ -221,13 +229,13 @@ def stability(
 
 
 def kept(archive: str | Path, quick: bool) -> Stability:
-    """The results of an interrupted run, from its archive."""
+    """Read the results of an interrupted call from its archive."""
     found = [result for result in read(archive) if result.case["quick"] == quick]
     return tabulated(found, cases(quick))
 
 
 def tabulated(results: list[Result], listed: list[Case]) -> Stability:
-    """The table of a sweep's results."""
+    """Make the table from the results of a sweep."""
     by_key, rows = {case.key: case for case in listed}, []
     for result in results:
         case, method = by_key[result.case["case"]], result.case["method"]
@@ -248,20 +256,21 @@ def _listed(quick: bool) -> dict[str, Case]:
 
 
 def _run(order: dict[str, Any]) -> dict[str, Any]:
-    """Run a case in any process; it is found by its name, as JSON cannot store it."""
+    """Run one case in a worker process. The order holds the name of the case, because JSON cannot store the case itself."""
     return _listed(order["quick"])[order["case"]].run(order["method"], order["seconds"])._asdict()
 
 
 def _wanted(case: Case) -> str:
-    """The expectation of a case, and the methods that must meet it."""
+    """What is expected of a case, and of which methods."""
     e = case.expectation
     everyone = e.kind == "must refuse" or set(case.methods) & set(OURS) <= set(e.must)
-    who = "all of ours" if everyone else "; ".join(filter(None, (", ".join(e.must), "no other lost without a warning")))
+    others = "others may stop or warn"
+    who = "all of our methods" if everyone else "; ".join(filter(None, (", ".join(e.must), others)))
     return f"* **{case.name}**: {case.what}{'' if case.what.endswith('?') else '.'} {e.kind.capitalize()} ({who}): {e.words}."
 
 
 def _first(says: str, most: int = 160) -> str:
-    """The beginning of a message, on one line."""
+    """The first part of a message, on one line."""
     return shorten(says, most, placeholder=" ...")
 
 
@@ -270,7 +279,7 @@ def _short(value: float) -> str:
 
 
 def _cell(row: Row | None) -> str:
-    """A verdict and its number."""
+    """A cell of the grid: the verdict and its number."""
     if row is None:
         return "·"
     f, word = row.found, MARK.get(row.verdict, row.verdict)

@@ -1,4 +1,4 @@
-r"""The horizon: after which time a run to a tolerance means nothing.
+r"""The horizon: the time at which an error of the start has grown to a tolerance. Later, a run means nothing.
 
 A small error of the start obeys the linearised equations along the motion. Let D(t) be their solution, the tangent of the flow, and
 W errors of positions and angles, orthonormal in the mean square over the discs: the first `WAVES` waves along the chain of each
@@ -7,8 +7,11 @@ size
 
     G(t) = max |D_q(t) W a| over |a| = 1,
 
-the largest singular value of D_q W, where D_q has the rows of positions and angles. The horizon of a tolerance is the first t with
-tolerance G(t) >= 1: then an error of that size at the start has grown to the length of the chain, or to a radian.
+the largest singular value of D_q W, where D_q has the rows of positions and angles. The horizon of an error is the first t with
+error G(t) >= tolerance. With the tolerance 1, the error has grown to the length of the chain, or to a radian.
+
+`Exponents.horizon` answers the same question from the growth of one random error, momenta included, and after the end of the run
+from the exponent. It is for long, chaotic motions. G is that of the worst error, so it is earlier; it is for short or regular ones.
 
 Long waves are taken, and not each disc by itself, as errors of steps are smooth too, and as G then has a limit for N -> infinity.
 Growth need not be exponential: about a regular motion G grows like t, since an error changes the frequencies.
@@ -42,9 +45,14 @@ class Growth:
     growth: Float
     dt: float
 
-    def horizon(self, tolerance: float) -> float:
-        """The first time at which an error of this size has grown to 1; infinite if there is none until the last time."""
-        reached = np.flatnonzero(self.growth * checks.number("tolerance", tolerance, positive=True) >= 1)
+    def horizon(self, error: float, tolerance: float = 1.0) -> float:
+        """The first time at which an error of the start has grown to the tolerance; infinite if there is none until the last time.
+
+        Both are of positions, over the length of the chain, and of angles, rad.
+        """
+        for name, value in (("error", error), ("tolerance", tolerance)):
+            checks.number(name, value, positive=True)
+        reached = np.flatnonzero(self.growth * error >= tolerance)
         return float(self.t[reached[0]]) if reached.size else np.inf
 
 
@@ -83,14 +91,16 @@ def growth(problem: Problem, dt: float | None = None, method: str = "gauss4", mo
     return Growth(t, np.array(found), h)
 
 
-def horizon(problem: Problem, tolerance: float, dt: float | None = None, method: str = "gauss4") -> float:
-    """The time from which a run of a problem to a tolerance means nothing; infinite if it is later than the duration.
+def horizon(problem: Problem, error: float, dt: float | None = None, method: str = "gauss4", tolerance: float = 1.0) -> float:
+    """The time at which an error of the start has grown to the tolerance; infinite if it is later than the duration.
 
     Parameters
     ----------
-    tolerance : of positions, over the length of the chain, and of angles, rad. Others as for `growth`, and the errors raised.
+    error, tolerance : of positions, over the length of the chain, and of angles, rad.
+    Others as for `growth`, and the errors raised.
     """
-    return growth(problem, dt, method, 1 / checks.number("tolerance", tolerance, positive=True)).horizon(tolerance)
+    most = checks.number("tolerance", tolerance, positive=True) / checks.number("error", error, positive=True)
+    return growth(problem, dt, method, most).horizon(error, tolerance)
 
 
 def _waves(problem: Problem) -> Float:

@@ -57,7 +57,11 @@ class Exponents:
         return found
 
     def horizon(self, error: float = 1e-16, tolerance: float = 1e-3) -> float:
-        """The time after which an error has grown to a tolerance; later, a run means nothing. May be infinite."""
+        """The time at which an error of the start has grown to the tolerance; later, a run means nothing. May be infinite.
+
+        Both are relative to the units of `discs.analysis.tangent.units`, momenta included. The growth is that of a random error;
+        after the end of the run it goes on with the exponent. `discs.analysis.horizon` takes the worst error, within the run.
+        """
         for name, value in (("error", error), ("tolerance", tolerance)):
             checks.number(name, value, positive=True)
         total = np.cumsum(self.growth[:, 0])

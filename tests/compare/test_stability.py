@@ -51,7 +51,7 @@ def test_no_run_is_wrong_without_a_warning():
         names = ("step above the explicit limit", "strong twist")
         study = stability(True, names, ("midpoint", "default"), seconds=4.0, executor=here, progress=False)
     assert not study.unsaid
-    assert " 0 are without a warning." in study.promise()
+    assert " 0 gave no warning." in study.promise()
     at = {(row.setting, row.method): row for row in study.rows if row.method == "default" or row.case == names[0]}
     for n in (33, 129):
         short, long = (at[f"N = {n}, h = {multiple} k", "midpoint"] for multiple in (1, 64))
@@ -72,8 +72,8 @@ def test_a_run_that_is_wrong_without_a_warning_is_told():
     rows += [Row("long time", "", "default", "holds", "yes", Found("done", off=off, energy=0.0)) for off in (5e-4, 2e-3)]
     study = Stability(rows, SMALL)
     assert [row.method for row in study.unsaid] == ["midpoint", "gauss6", "default"]
-    assert "3 are wrong by more than 5 %" in study.promise()
-    assert "3 are without a warning:\n* step above the explicit limit, N = 33, h = 1 k, `midpoint`" in study.promise()
+    assert "3 have an error above 5 %" in study.promise()
+    assert "3 gave no warning:\n* step above the explicit limit, N = 33, h = 1 k, `midpoint`" in study.promise()
 
 
 def one(table, name, setting, method):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from discs import simulate
-from discs.analysis import growth, horizon
+from discs.analysis import growth, horizon, lyapunov
 from discs.chains.twist import untwisting_chain
 from discs.loads import Custom
 from tests.conftest import Model, uneven
@@ -82,6 +82,17 @@ def test_growth_has_a_limit_for_many_discs():
     assert found[2].horizon(1e-2) == np.inf  # later than the duration
 
 
+def test_both_horizons_tell_of_the_same_growth():
+    """The worst error is lost first; each further digit lasts as long in both, ln 10/sigma."""
+    problem = replace(ring(5, "field", 1.2), duration=24.0)
+    fastest = waves(5, "field", 1.2).real.max()
+    worst, one = growth(problem, 0.2, "midpoint"), lyapunov(problem, 1, 0.2, "midpoint", every=2)
+    assert worst.horizon(1e-8, 1e-2) < one.horizon(1e-8, 1e-2)
+    for found in (worst, one):
+        assert found.horizon(1e-8, 1e-2) == found.horizon(1e-6, 1.0) > found.horizon(1e-7, 1e-2)
+        assert found.horizon(1e-8, 1e-2) - found.horizon(1e-8, 1e-3) == pytest.approx(np.log(10) / fastest, abs=0.4)  # an interval
+
+
 def test_the_computation_ends_at_the_horizon():
     times = []
 
@@ -100,8 +111,10 @@ def test_bad_input():
     with pytest.raises(ValueError, match="growth is that of a Problem"):
         horizon(problem.chain, 1e-3)
     for wrong in (0.0, -1.0, np.nan, "small"):
-        with pytest.raises(ValueError, match="tolerance must be"):
+        with pytest.raises(ValueError, match="error must be"):
             horizon(problem, wrong)
+        with pytest.raises(ValueError, match="tolerance must be"):
+            horizon(problem, 1e-3, tolerance=wrong)
     with pytest.raises(ValueError, match="dt must be"):
         growth(problem, -0.1)
     with pytest.raises(ValueError, match="most must be"):
