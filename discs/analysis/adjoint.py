@@ -64,8 +64,8 @@ def gradient(
         method, as "gauss4".
     cost_gradient : instead of dual numbers: run -> the derivatives of the cost, arrays (F, n) by the names of its quantities.
     progress : show a progress bar for more than a second.
-    engine : as for `simulate`. Where headings follow the line, the curvature is linear and loads are, the pass back is compiled
-        too; elsewhere it takes sparse matrices of SciPy.
+    engine : as for `simulate`. With own headings, or the linear curvature, and linear loads the pass back is compiled too;
+        elsewhere it takes sparse matrices of SciPy.
 
     Returns
     -------

@@ -1,7 +1,8 @@
 """The linearised equations at many states at once, the stages of steps and frames; `discs.analysis.linear` has them one by one.
 
-`Equations` are those of any problem. `ConstantEquations` are computed by array operations for all states together, where the second
-derivatives are constant: slaved headings, linear curvature, linear loads. They have a compiled form, `discs.kernels.linearised`.
+`Equations` are those of any problem. `SweptEquations`, those with linear loads, have a compiled form, `discs.kernels.linearised`:
+`SteeredEquations` for own headings, and `ConstantEquations` for slaved headings and the linear curvature, whose second derivatives
+are constant. These are computed by array operations for all states together.
 """
 
 from dataclasses import replace
@@ -14,7 +15,7 @@ import scipy  # its parts, slow to import, when they are used
 from discs.analysis.linear import Linearised
 from discs.arrays import Float, Matrix
 from discs.chains import stencils
-from discs.chains.chain import Chain
+from discs.chains.chain import SteeredChain
 from discs.loads import signals
 from discs.loads.linear import Linear
 from discs.problem import Problem
@@ -92,7 +93,45 @@ class Equations:
         return found
 
 
-class ConstantEquations(Equations):
+class SweptEquations(Equations):
+    """Those whose loads have constant f_q and D = -f_v, with a compiled form; see `equations`."""
+
+    def dragged(self, at: At, w: Float) -> Float:
+        return -_times(self.drag.T, w)
+
+    @cached_property
+    def drag(self) -> Matrix:
+        """D, sparse (3 n, 3 n)."""
+        return self._of_load[1]
+
+    @cached_property
+    def held(self) -> Matrix:
+        """-f_q, sparse (3 n, 3 n)."""
+        return self._of_load[0]
+
+    @cached_property
+    def _of_load(self) -> tuple[Matrix, Matrix]:
+        q, load = self.problem.start().hi, self.system.load
+        if load is None:
+            return scipy.sparse.csr_array((q.size, q.size)), scipy.sparse.csr_array((q.size, q.size))
+        of_q, of_v = ((-part).tocsr() for part in load.derivatives(0.0, q, np.zeros_like(q)))
+        for part in (of_q, of_v):
+            part.eliminate_zeros()
+        return of_q, of_v
+
+    def forces(self, t: Float) -> Float:
+        """f at q = v = 0 and the times t (M,), (M, 3, n); (1, 3, n) if it is constant, (0, 3, n) for none."""
+        load, still = self.system.load, np.zeros_like(self.problem.start().hi)
+        if load is None:
+            return still[None][:0]
+        assert isinstance(load, Linear)
+        constant = replace(load, drives=()).force(0.0, still, still)[None]
+        driven = [np.multiply.outer(signals.values(drive.signal, t, drive.name), drive.pattern) for drive in load.drives]
+        found: Float = constant + sum(driven) if driven else constant
+        return found
+
+
+class ConstantEquations(SweptEquations):
     """Those whose S = grad^2 V - f_q and D = -f_v do not depend on the state; see `equations`."""
 
     def __init__(self, problem: Problem) -> None:
@@ -137,9 +176,6 @@ class ConstantEquations(Equations):
         tension[:, 2] = self._springs.twist * links[:, 2]
         return stencils.pull(tension, ends)
 
-    def dragged(self, at: At, w: Float) -> Float:
-        return -_times(self.drag.T, w)
-
     def stretched(self, q: Float, w: Float) -> Float:
         links = self._links(q)
         bends = stencils.bends(links[:, :2], self.chain.ends)
@@ -151,44 +187,32 @@ class ConstantEquations(Equations):
     def _strains(self) -> Any:
         return self.system.strains(self.system.shape(self.problem.start().hi))
 
-    @cached_property
-    def drag(self) -> Matrix:
-        """D, sparse (3 n, 3 n)."""
-        return self._of_load[1]
 
-    @cached_property
-    def held(self) -> Matrix:
-        """-f_q, sparse (3 n, 3 n)."""
-        return self._of_load[0]
+class SteeredEquations(SweptEquations):
+    """Those of discs with their own headings."""
 
-    @cached_property
-    def _of_load(self) -> tuple[Matrix, Matrix]:
-        q, load = self.problem.start().hi, self.system.load
-        if load is None:
-            return scipy.sparse.csr_array((q.size, q.size)), scipy.sparse.csr_array((q.size, q.size))
-        of_q, of_v = ((-part).tocsr() for part in load.derivatives(0.0, q, np.zeros_like(q)))
-        for part in (of_q, of_v):
-            part.eliminate_zeros()
-        return of_q, of_v
-
-    def forces(self, t: Float) -> Float:
-        """f at q = v = 0 and the times t (M,), (M, 3, n); (1, 3, n) if it is constant, (0, 3, n) for none."""
-        load, still = self.system.load, np.zeros_like(self.problem.start().hi)
-        if load is None:
-            return still[None][:0]
-        assert isinstance(load, Linear)
-        constant = replace(load, drives=()).force(0.0, still, still)[None]
-        driven = [np.multiply.outer(signals.values(drive.signal, t, drive.name), drive.pattern) for drive in load.drives]
-        found: Float = constant + sum(driven) if driven else constant
-        return found
+    def stretched(self, q: Float, w: Float) -> Float:
+        k = self.chain.k
+        shapes = [self.system.shape(place) for place in q]
+        d, middle = (np.array([getattr(shape, name) for shape in shapes]) for name in ("d", "middle"))
+        still = type(shapes[0])(*(0 * part for part in shapes[0]))
+        changes = [self.system.moved(still, part) for part in w]
+        by_d, by_m = (np.array([getattr(change, name) for change in changes]) for name in ("d", "middle"))
+        cos, sin = np.cos(middle), np.sin(middle)
+        turned, along = (cos * d[:, 0] + sin * d[:, 1]) / k, (cos * d[:, 1] - sin * d[:, 0]) / k
+        stretch = (turned - 1) * ((cos * by_d[:, 0] + sin * by_d[:, 1]) / k + along * by_m)
+        shear = along * ((cos * by_d[:, 1] - sin * by_d[:, 0]) / k - turned * by_m)
+        parts = stretch, shear, d[:, 2] * by_d[:, 2] / k**2, d[:, 3] * by_d[:, 3] / k**2
+        return np.concatenate([part.sum(axis=0) for part in parts])
 
 
 def equations(problem: Problem) -> Equations:
     """The linearised equations of a problem at many states."""
     load, chain = problem.system.load, problem.chain
-    constant = isinstance(chain, Chain) and problem.system.quadratic
-    if constant and load is not None:
-        constant = isinstance(load, Linear) and load.section is None
+    linear = load is None or (isinstance(load, Linear) and load.section is None)
+    if isinstance(chain, SteeredChain):
+        return SteeredEquations(problem) if linear else Equations(problem)
+    constant = linear and problem.system.quadratic
     if constant and isinstance(load, Linear) and load.bends is not None:
         constant = not (load.bends.viscosity.any() or any(drive.curvature is not None for drive in load.drives))
     return ConstantEquations(problem) if constant else Equations(problem)

@@ -7,7 +7,7 @@ import numpy as np
 
 from discs.analysis.parameters import INERTIAS
 from discs.analysis.sparse_tangent import Tangent, tangent
-from discs.analysis.stages import ConstantEquations, Passed, equations
+from discs.analysis.stages import Passed, SweptEquations, equations
 from discs.analysis.steps import Steps, Taken
 from discs.arrays import Float, Matrix
 from discs.kernels.background import missing, usual
@@ -18,9 +18,9 @@ TOLERANCE = 1e-12  # of sweeps, relative
 
 
 class Sweeps:
-    """Compiled sweeps through the steps of a problem whose linearised equations are `ConstantEquations`."""
+    """Compiled sweeps through the steps of a problem whose linearised equations are `SweptEquations`."""
 
-    def __init__(self, steps: Steps, equations: ConstantEquations) -> None:
+    def __init__(self, steps: Steps, equations: SweptEquations) -> None:
         self.steps, self.equations = steps, equations
         self._drag, self._held = (_sparse(matrix, equations.chain.n) for matrix in (equations.drag, equations.held))
 
@@ -61,7 +61,7 @@ class Sweeps:
 
     def _given(self, t: float, h: float, count: int) -> tuple[Any, Any]:
         """The parameters of the chain for some steps, and what loads add to the linearised equations."""
-        from discs.kernels import slaved_linearised  # noqa: F401, the forms
+        from discs.kernels import slaved_linearised, steered_linearised  # noqa: F401, the forms
         from discs.kernels.linearised import Given  # numba is slow to import
 
         forces = self.equations.forces(self.steps.times(t, h, count))
@@ -110,7 +110,7 @@ def _sparse(matrix: Matrix, n: int) -> Any:
 def sweeps(steps: Steps) -> Sweeps | None:
     """Compiled sweeps, if the steps are compiled and the linearised equations have a compiled form."""
     found = equations(steps.problem)
-    return Sweeps(steps, found) if steps.compiled and isinstance(found, ConstantEquations) else None
+    return Sweeps(steps, found) if steps.compiled and isinstance(found, SweptEquations) else None
 
 
 def ready(problem: Problem, integrator: Any, engine: str | None = None) -> bool:

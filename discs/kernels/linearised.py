@@ -43,6 +43,7 @@ class Stages(NamedTuple):
     c, v, g : (s, rows, n), C, C pi and grad V - f. arm : (s, 2, n), contact directions of discs of radius 1. turned : (s, headings,
     rows, n), dC/dh, times pi once `linearise` is done. pull : (s, headings, columns, n), dC/dh . g.
     work, flat : workspaces of the chain, at the last stage and at links of zero. still : (rows, n), zeros. along : (n,).
+    kept : (s, `kept`, links), what else chains keep of a stage, at their links.
     stiff, single, double : matrices as in `discs.integrators.collocation.Stages`; x, z : right sides.
     """
 
@@ -56,6 +57,7 @@ class Stages(NamedTuple):
     flat: Any
     still: NDArray
     along: NDArray
+    kept: NDArray
     stiff: Any
     single: Any
     double: Any
@@ -69,6 +71,11 @@ class Stages(NamedTuple):
 @stub
 def headings(chain):
     """How many headings h of a disc C depends on."""
+
+
+@stub
+def kept(chain):
+    """How many arrays over its links a chain keeps of a stage."""
 
 
 @stub
@@ -105,8 +112,20 @@ def stages(rule, chain, rows, columns):
     stiff, single = do.factors(chain, 1.0, 1), do.factors(chain, 1.0, rule.real.size)
     double, z = do.factors(chain, 1.0j, rule.pairs.size), np.empty((columns, n), np.complex128)
     work, flat = do.workspace(chain), do.workspace(chain)
-    still, along, x = np.zeros((rows, n)), np.empty(n), np.empty((columns, n))
-    return Stages(c, v, g, arm, turned, pull, work, flat, still, along, stiff, single, double, x, z)
+    still, along, x, more = np.zeros((rows, n)), np.empty(n), np.empty((columns, n)), np.empty((s, kept(chain), n + 1))
+    return Stages(c, v, g, arm, turned, pull, work, flat, still, along, more, stiff, single, double, x, z)
+
+
+@part
+def weigh_roll(c, arm, mass, g, m, nu, p, sums):
+    """`weigh` for the column of C by which a disc rolls, (e, 1)/root: with w rho, w alpha and R."""
+    cx, cy, ct, ax, ay = c[0], c[1], c[2], arm[0], arm[1]
+    for i in range(ct.size):
+        x, y, t = m[0, i] * p[i] - nu[i] * g[0, i], m[1, i] * p[i] - nu[i] * g[1, i], m[2, i] * p[i] - nu[i] * g[2, i]
+        whole, across = cx[i] * x + cy[i] * y + ct[i] * t, cx[i] * ax[i] + cy[i] * ay[i]
+        sums[0, i] -= 0.5 * (cx[i] * cx[i] + cy[i] * cy[i]) * whole
+        sums[1, i] -= 0.5 * ct[i] * ct[i] * whole
+        sums[2, i] += ct[i] * (ax[i] * x + ay[i] * y - mass[i] * across * whole)
 
 
 @part

@@ -17,6 +17,11 @@ def _headings(chain):
     return 2
 
 
+@fill(linearised.kept, Slaved)
+def _kept(chain):
+    return 0
+
+
 @fill(linearised.turns, Slaved)
 def _turns(chain, at, j):
     c, arm, d, half = at.c[j], at.arm[j], at.work.base, 0.5 / chain.k
@@ -91,10 +96,4 @@ def release(ends, to):
 
 @fill(linearised.weigh, Slaved)
 def _weigh(chain, at, j, m, nu, p, sums):
-    (cx, cy, ct), (gx, gy, gt), (ax, ay), mass = at.c[j], at.g[j], at.arm[j], chain.weights[0]
-    for i in range(ct.size):
-        x, y, t = m[0, i] * p[0, i] - nu[0, i] * gx[i], m[1, i] * p[0, i] - nu[0, i] * gy[i], m[2, i] * p[0, i] - nu[0, i] * gt[i]
-        whole, across = cx[i] * x + cy[i] * y + ct[i] * t, cx[i] * ax[i] + cy[i] * ay[i]
-        sums[0, i] -= 0.5 * (cx[i] * cx[i] + cy[i] * cy[i]) * whole
-        sums[1, i] -= 0.5 * ct[i] * ct[i] * whole
-        sums[2, i] += ct[i] * (ax[i] * x + ay[i] * y - mass[i] * across * whole)
+    linearised.weigh_roll(at.c[j], at.arm[j], chain.weights[0], at.g[j], m, nu[0], p[0], sums)

@@ -99,6 +99,58 @@ def test_gradients_over_many_steps_are_exact(engine, steps):
         assert found[name][1] == pytest.approx(slope, rel=1e-8), name
 
 
+def own_headings(chain, q, p, steps, h):
+    """Steps of Gauss's method of order 4 for own headings and plain links, in complex numbers; q (M, 4, n), p (M, 2, n)."""
+    k, a, b = chain["k"], np.array([[0.25, 0.25 - np.sqrt(3) / 6], [0.25 + np.sqrt(3) / 6, 0.25]]), 0.5
+    spin = np.sqrt(chain["w"] * (chain["spin_inertia"] + chain["density"] * chain["radius"] ** 2))
+    turn = np.sqrt(chain["w"] * chain["heading_inertia"])
+    p = np.stack([spin, turn], axis=1) * p
+
+    def rate(q, p):
+        d, m = np.diff(q, axis=2) / k, 0.5 * (q[:, 3, 1:] + q[:, 3, :-1])
+        cos, sin = np.cos(m), np.sin(m)
+        along, across = cos * d[:, 0] + sin * d[:, 1], cos * d[:, 1] - sin * d[:, 0]
+        n, s = chain["stretch_stiffness"] * (along - 1), chain["shear_stiffness"] * across
+        moments = chain["torsion_stiffness"] * d[:, 2], chain["bending_stiffness"] * d[:, 3]
+        pull, force = np.stack([cos * n - sin * s, sin * n + cos * s, *moments], axis=1), np.zeros_like(q)
+        force[..., :-1] += pull
+        force[..., 1:] -= pull
+        couple = 0.5 * k * (n * across - s * along)
+        force[:, 3, :-1] -= couple
+        force[:, 3, 1:] -= couple
+        e = chain["radius"] * np.array([-np.sin(q[:, 3]), np.cos(q[:, 3])])
+        c = np.stack([*e, 1 + 0 * e[0]], axis=1) / spin[:, None]
+        of_p = np.stack([(c * force[:, :3]).sum(axis=1), force[:, 3] / turn], axis=1)
+        return np.concatenate([c * p[:, :1], p[:, 1:] / turn[:, None]], axis=1), of_p
+
+    stages = [rate(q, p)] * 2
+    for _ in range(steps):
+        for _ in range(12):
+            at = [[z + h * sum(w * f[i] for w, f in zip(row, stages, strict=True)) for i, z in enumerate((q, p))] for row in a]
+            stages = [rate(*place) for place in at]
+        q, p = (z + h * b * (stages[0][i] + stages[1][i]) for i, z in enumerate((q, p)))
+    return q
+
+
+@pytest.mark.parametrize(("engine", "steps"), [pytest.param("plain", 20, marks=pytest.mark.slow), longer("compiled", 1000)])
+def test_gradients_of_own_headings_are_exact(engine, steps):
+    """Against the complex step through an independent code, for each kind of parameter and of initial value."""
+    h, (names, fields) = 0.005, ((*CHAIN, *OWN[2:]), ("x", "y", "theta", "phi", "omega", "phi_rate"))
+    problem = replace(uneven(5, Model("springs", "steered")), duration=steps * h)
+    own, start, every = problem.chain, problem.initial, (*names, *fields)
+    small = 1e-30j * np.eye(len(every))[:, :, None]  # a change of entry 1 of each
+    size = {name: np.size(getattr(own, name)) for name in names} | dict.fromkeys(fields, 5)
+    moved = {name: small[:, i] * (np.arange(size[name]) == 1) for i, name in enumerate(every)}
+    chain = {name: np.asarray(getattr(own, name)) + moved[name] for name in names} | {"k": own.k, "w": own.w}
+    values = [np.asarray(getattr(start, name)) * np.ones(5) + moved[name] for name in fields]
+    q = own_headings(chain, np.stack(values[:4], axis=1), np.stack(values[4:], axis=1), steps, h)
+    found = gradient(problem, lambda run: run.y[-1, 0], every, Gauss4(tolerance=1e-15), h, progress=False, engine=engine)
+    slopes = dict(zip(every, q[:, 1, 0].imag / 1e-30, strict=True))
+    largest = max(abs(slope) for slope in slopes.values())
+    for name, slope in slopes.items():
+        assert found[name][1] == pytest.approx(slope, rel=1e-8, abs=1e-10 * largest), name
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", [Midpoint(tolerance=1e-14), Gauss4(tolerance=1e-14)], ids=["midpoint", "gauss4"])
 @models([Model("springs", "field"), Model("consistent", "unit"), Model("ring", "field")], [Model("ring", "field")])

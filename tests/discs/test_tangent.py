@@ -8,7 +8,9 @@ import pytest
 from discs import Chain, Problem, SimulationError, State, simulate
 from discs.__main__ import main
 from discs.analysis import lyapunov, modes
+from discs.analysis.parameters import Parameters
 from discs.analysis.sparse_tangent import tangent
+from discs.analysis.stages import Equations
 from discs.analysis.steps import Steps, Taken
 from discs.analysis.swept import Swept, sweeps
 from discs.analysis.tangent import METHODS, Flow
@@ -56,25 +58,49 @@ def test_tangent_is_the_derivative_of_the_step(model, method):
 @pytest.mark.parametrize("stages", [1, 2, 4])
 @models([Model("springs", "field"), Model("consistent", "unit"), Model("ring", "field")])
 def test_sweeps_solve_the_systems_of_sparse_matrices(model, stages, kernels_as_python):
-    """Those of steps and of their transposes, through two steps with something added between."""
-    problem, rng, rule, h = uneven(9, model), np.random.default_rng(3), tableau(stages), 0.05
+    sweeps_are_sparse_matrices(uneven(9, model), stages)
+
+
+@pytest.mark.parametrize("stages", [2, 3])
+@pytest.mark.parametrize("degree", [1, 2])
+@models([Model("springs", "steered"), Model("ring", "steered")])
+def test_sweeps_of_own_headings_solve_the_systems_of_sparse_matrices(model, degree, stages, kernels_as_python):
+    """Their second derivatives change with the state."""
+    problem = uneven(9 if model.ends == "springs" else 8, model)
+    loads = LOADS if degree == 1 else (Slope(0.2, -0.4), Damping(rolling=0.3), *LOADS[2:])
+    sweeps_are_sparse_matrices(replace(problem, chain=replace(problem.chain, degree=degree)), stages, loads)
+
+
+def sweeps_are_sparse_matrices(problem, stages, loads=LOADS):
+    """Those of steps and of their transposes, through two steps with something added between; with loads for several stages."""
+    rng, rule, h, n = np.random.default_rng(3), tableau(stages), 0.05, problem.chain.n
     if stages > 1:
-        problem = replace(problem, loads=LOADS)
-    start, size = problem.start(), 36
-    q = start.hi + 1e-2 * rng.normal(size=(2, stages, 3, 9))
-    taken = Taken(start, q, rng.normal(size=(2, stages, 1, 9)), 0)
+        problem = replace(problem, loads=loads)
+    start = problem.start()
+    rows, columns = len(start.hi), np.atleast_2d(start.pi).shape[0]
+    q, size = start.hi + 1e-2 * rng.normal(size=(2, stages, rows, n)), (rows + columns) * n
+    taken = Taken(start, q, rng.normal(size=(2, stages, columns, n)), 0)
     swept = swept_of(problem, rule)
     first, second = (by_matrices(swept, taken, k, 0.3, h) for k in (0, 1))
     w, v, kick = rng.normal(size=(3, size))
     value = w.copy()
-    done, _, passed = swept.back(taken, 0.3, h, 2, value, {0: kick}, True)
+    done, sums, passed = swept.back(taken, 0.3, h, 2, value, {0: kick}, True)
     middle = second.back(w) + kick
     assert done == 2
     np.testing.assert_allclose(value, first.back(middle), atol=1e-11)
-    nu = first.rates_back(middle, first.stages_back(middle))[:, 27:]
-    at = swept.equations.at(q[0], taken.pi[0], passed.t[:stages])
-    np.testing.assert_allclose(passed.w[:stages], at.c * nu[:, None], atol=1e-11)
-    np.testing.assert_allclose(passed.velocity[:stages], at.velocity, atol=1e-13)
+    names = ("density", "spin_inertia", "radius", *["heading_inertia"] * (rows == 4), "bending_stiffness")
+    there, plain = Parameters(swept.equations, names), Parameters(Equations(problem), names)
+    there.add(sums, passed)
+    for k, step, after in ((0, first, middle), (1, second, w)):
+        at = Equations(problem).at(q[k], taken.pi[k], 0.3 + h * (k + rule.nodes))
+        m = step.rates_back(after, step.stages_back(after))
+        plain.add_stages(at, m)
+        part = slice(k * stages, (k + 1) * stages)
+        nu = m[:, rows * n :].reshape(stages, -1, n)
+        np.testing.assert_allclose(passed.w[part], at.c * nu[:, np.arange(rows) // 3], atol=1e-11)
+        np.testing.assert_allclose(passed.velocity[part], at.velocity, atol=1e-13)
+    for name, found in plain.found().items():
+        np.testing.assert_allclose(there.found()[name], found, atol=1e-11, err_msg=name)
     one = Swept(swept, taken._replace(q=q[:1], pi=taken.pi[:1]), 0.3, h)
     both = np.stack([v, w], axis=1)
     np.testing.assert_allclose(one.forward(both), first.forward(both), atol=1e-11)
