@@ -1,4 +1,5 @@
-"""Make the pictures of docs/pictures.md, ground-force, loads, modes, motion, vakonomic.png and rod.gif: `docs/pictures.py`, 40 s.
+"""Make the pictures of docs/pictures.md, ground-force, loads, modes, motion, stability, vakonomic.png and rod.gif, in some minutes:
+`docs/pictures.py`.
 
 The page's picture needs chromium. convergence.png, energy.png and limits.png are the main job's; `python -m continuum.figures
 docs/images` makes those of the field.
@@ -19,7 +20,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
-from compare import convergence, figures, lump
+from compare import convergence, figures, lump, stability
+from compare.hardcases.runs import FIXED
 from compare.limit_figures import limits_of
 from continuum import dispersion, solve, untwisting_rod
 from discs import Chain, Problem, Solution, State, simulate
@@ -243,6 +245,7 @@ def main() -> None:
     loads().savefig(IMAGES / "loads.png", dpi=100)
     small_motions().savefig(IMAGES / "modes.png", dpi=100)
     ground_force().savefig(IMAGES / "ground-force.png", dpi=100)
+    stability(names=["step above the explicit limit"], methods=FIXED, progress=False).plot(IMAGES / "stability.png")
     if not shutil.which("chromedriver"):
         sys.exit("no chromedriver: view.png and lab.png are not made")
     few = simulate(lump(scene, n=17), dt=0.02, frames=91)

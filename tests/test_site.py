@@ -142,3 +142,28 @@ Returns
 def test_powers_are_not_emphasis_and_code_is_left_alone(docstrings):
     text = "K r**2 and **Rolling.** and `a**b`\n\n    r**2 + q**2\n"
     assert docstrings.literal(text) == "K r\\*\\*2 and **Rolling.** and `a**b`\n\n    r**2 + q**2\n"
+
+
+@pytest.mark.parametrize(
+    ("house", "tex"),
+    [
+        ("rho w r.. = -K r'''' + lambda,   r. = e theta.", r"\rho w \ddot{r} = -K r'''' + \lambda ,\qquad \dot{r} = e \theta ."),
+        (
+            "M q.. = A^T mu. + e.F - R (p.d_1) q._k/2,",
+            r"M \ddot{q} = A ^{\mathsf{T}} \dot{\mu} + e \cdot F - R (p \cdot d_{1}) \dot{q}_{k}/2,",
+        ),
+        ("c_i = (e_i, 1)/sqrt(m (1 + q_{i+1})**2)", r"c_{i} = (e_{i}, 1)/\sqrt{m (1 + q_{i +1})^2}"),
+        ("sum_links beta theta'^2 + int_0^tau dpi,", r"\sum_{\text{links}} \beta \theta '^{2} + \int_{0}^{\tau} d\pi ,"),
+        ("<p, xi_Q> = 2 for the end,", r"\langle p , \xi_{Q}\rangle{} = 2 \;\text{for} \;\text{the} \;\text{end} ,"),
+        ("a = b,\n        + c.", r"\begin{aligned} & a = b , \\ & \qquad + c. \end{aligned}"),
+    ],
+)
+def test_formulas_become_tex(docstrings, house, tex):
+    found = docstrings.formulas(f"Text:\n\n    {house}\n\nMore text.")
+    assert re.sub(" ", "", found) == re.sub(" ", "", f"Text:\n\n$$\n{tex}\n$$\n\nMore text.")
+
+
+@pytest.mark.parametrize("block", ["[a   M^T] [x]", 'scene = "untwisting_rod"', "torque tau    tau psi", "n : number, a = b"])
+def test_other_blocks_stay(docstrings, block):
+    text = f"Text:\n\n    {block}\n"
+    assert docstrings.formulas(text) == text

@@ -96,8 +96,8 @@ def horizon(problem: Problem, error: float, dt: float | None = None, method: str
 
     Parameters
     ----------
+    problem, dt, method : as for `growth`, which raises the errors.
     error, tolerance : of positions, over the length of the chain, and of angles, rad.
-    Others as for `growth`, and the errors raised.
     """
     most = checks.number("tolerance", tolerance, positive=True) / checks.number("error", error, positive=True)
     return growth(problem, dt, method, most).horizon(error, tolerance)
