@@ -2,13 +2,14 @@
 
 import argparse
 import sys
+from contextlib import nullcontext
 
 from compare import main_page
 from compare.background import background
 from compare.commands import COMMANDS
 from compare.help import HELP
 from compare.limits import limits
-from compare.main_job import SIZES, overview, summary
+from compare.main_job import SIZES, overview, quick, summary
 from compare.outputs import fresh_files
 from compare.speed import speed
 from continuum import untwisting_rod
@@ -63,7 +64,7 @@ def run_main_job(options: argparse.Namespace) -> None:
     scene = read_scene(options.scene) if options.scene else untwisting_rod(options.rolling or "field")
     measured, speeds = None, ""
     own_headings = not options.scene and not options.no_limits
-    with compiling_aside(), background() as executor:
+    with compiling_aside(), nullcontext() if quick(scene, tuple(options.n)) else background() as executor:
         studies = overview(scene, options.out, tuple(options.n), options.tol, not options.quiet, executor, options.degree)
         print(summary(studies))
         print(

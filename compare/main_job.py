@@ -16,7 +16,9 @@ from compare.results import Study, write_studies
 from compare.study import checked_sizes, convergence
 from compare.tables import aligned
 from continuum import Scene, solve
-from discs import Solution, simulate, suggest_dt
+from discs import Gauss8, Solution, simulate, suggest_dt
+from discs.kernels.background import usual
+from discs.running.ready import kernels
 
 SIZES = (17, 33, 65, 129, 257, 513)
 T = TypeVar("T")
@@ -81,6 +83,15 @@ def overview(
         ax.set_title(f"{scene.name}, {scene.law}, energy over [0, {long.duration:g}]")
         figures.save(ax, folder / "energy.png")
     return studies
+
+
+def quick(scene: Scene, n: tuple[int, ...]) -> bool:
+    """Whether the job takes less time in one process than another one takes to start: few discs, and their kernels are there."""
+    with warnings.catch_warnings(action="ignore"):  # the job warns itself
+        problem = lump(scene, SIZES[0])
+    if max(n) > SIZES[-1] or usual() == "plain" or problem.system.parameters is None:
+        return False
+    return bool(kernels("ready", problem, Gauss8(), problem.duration, True, True))
 
 
 def _awaited(future: Future[T], what: str, progress: bool) -> T:

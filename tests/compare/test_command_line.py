@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from compare import overview
+from compare import lump, overview
 from compare.__main__ import main
+from compare.main_job import quick
 from compare.outputs import fresh_files
-from continuum import breathing_ring
+from continuum import breathing_ring, untwisting_rod
+from discs import Gauss8, simulate
 
 pytestmark = pytest.mark.slow
 
@@ -50,6 +52,20 @@ def test_speed_against_error_is_part_of_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("discs.kernels.background.USUAL", ["plain"])
     assert main(["--no-limits", "--out", str(tmp_path / "plain"), "--quiet"]) == 0
     assert "a run was plain: it was asked for" in capsys.readouterr().out
+
+
+def test_another_process_starts_only_where_it_pays(monkeypatch):
+    """Not for few discs whose kernels are there."""
+    monkeypatch.setattr("discs.kernels.background.USUAL", ["compiled"])
+    scene = untwisting_rod()
+    simulate(lump(scene, 17), Gauss8(), 0.1, 1, progress=False)  # compiled by now
+    assert quick(scene, (17, 33))
+    assert not quick(scene, (17, 1025))
+    monkeypatch.setattr("discs.kernels.background.USUAL", ["plain"])
+    assert not quick(scene, (17, 33))
+    monkeypatch.setattr("discs.kernels.background.USUAL", ["auto"])
+    monkeypatch.setattr("compare.main_job.kernels", lambda *_: False)
+    assert not quick(scene, (17, 33))
 
 
 @pytest.mark.long  # the paper's scheme with own headings has a kernel of its own
