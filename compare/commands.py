@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from compare import load_limits, precision, report, slip
+from compare.crosschecks import command as crosschecks
 from compare.hardcases.table import Stability, kept, stability
 from compare.lab import command as lab_command
 from compare.outputs import fresh_files
@@ -243,5 +244,6 @@ COMMANDS: dict[str, Callable[[argparse.ArgumentParser], None]] = {
     "trust": add_trust,
     "loads": add_loads,
     "slip": add_slip,
+    "crosscheck": crosschecks.add_options,
     "report": add_report,
 }

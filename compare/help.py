@@ -37,6 +37,12 @@ HELP = {
         "Written: slip.csv, slip.png.",
         "--n 9 17 33",
     ),
+    "crosscheck": (
+        "the same problems by other programs",
+        "Run the same problems by this program and by the others that are installed (the extra crosscheck has all), and "
+        "show the difference, its order and both times. Written: crosschecks.md, crosschecks.csv.",
+        "--peers SymPy SciPy",
+    ),
     "report": (
         "everything on one page",
         "Write one page with the motion, N to infinity, the ground's force, both laws of rolling, energy, speed and stability: "

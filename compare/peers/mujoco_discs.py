@@ -49,13 +49,14 @@ GRAVITY, MU, STIFFER, IMPEDANCE = 10.0, 1e4, 1e4, 0.9999  # the last is the most
 OFTEN = 64
 
 
-def mujoco_peer(problem: Problem, second_order: bool = True) -> Peer:
+def mujoco_peer(problem: Problem, second_order: bool = True, stiffer: float = STIFFER) -> Peer:
     """MuJoCo on discs that roll by friction.
 
     Parameters
     ----------
     problem : a `SteeredChain`, or a `Chain` with rolling "unit" and linear curvature; any ends.
     second_order : slip reflected and half a kick to start, or slip damped out in a step; see the module's docstring.
+    stiffer : how much stiffer friction is than the normal contact, > 0.
 
     Returns
     -------
@@ -77,7 +78,7 @@ def mujoco_peer(problem: Problem, second_order: bool = True) -> Peer:
         import mujoco
 
         steps = max(1, round(setting))
-        model, data = _build(problem, problem.duration / steps, second_order)
+        model, data = _build(problem, problem.duration / steps, second_order, stiffer)
         q, force, step = data.qpos, data.qfrc_applied, mujoco.mj_step
         pull(q, force)
         if second_order:
@@ -115,7 +116,7 @@ def _check(data: Any, until: float) -> None:
         raise ArithmeticError(f"MuJoCo is unstable at time {data.time:g}; take more steps")
 
 
-def _build(problem: Problem, h: float, second_order: bool) -> tuple[Any, Any]:
+def _build(problem: Problem, h: float, second_order: bool, stiffer: float) -> tuple[Any, Any]:
     """The discs at their start, for one step h."""
     import mujoco
 
@@ -130,7 +131,7 @@ def _build(problem: Problem, h: float, second_order: bool) -> tuple[Any, Any]:
     spec = mujoco.MjSpec()
     option = spec.option
     option.timestep, option.gravity = h, [0, 0, -GRAVITY]
-    option.integrator, option.cone, option.impratio = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtCone.mjCONE_ELLIPTIC, STIFFER
+    option.integrator, option.cone, option.impratio = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtCone.mjCONE_ELLIPTIC, stiffer
     option.solver, option.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, 1e-14
     flags = mujoco.mjtDisableBit
     # all contacts in one sparse system: faster than one a disc ("islands")
