@@ -13,7 +13,7 @@ export NO_MKDOCS_2_WARNING := 1
 MINIMAL := $(addprefix tests/, $(addprefix discs/test_, system.py mechanics.py archive.py figures.py view.py contact.py) \
     $(addprefix continuum/test_, cells.py lattice.py lagrangian.py))
 
-.PHONY: run test bench long quick lint types kernels tested field docs minimal coverage clean
+.PHONY: run test bench long quick lint types kernels tested field docs paper minimal coverage clean
 
 run: .venv/run
 	$(BIN)/python -m compare --out out
@@ -66,6 +66,10 @@ docs: .venv/docs
 	cd out/gallery && for script in ../../docs/gallery/*.py; do ../../$(BIN)/python $$script || exit 1; done
 	$(BIN)/mkdocs build --strict
 
+# the paper in out/paper, as a PDF and as pictures
+paper: .venv/paper
+	$(BIN)/python paper/build.py out/paper
+
 # the oldest versions that pyproject.toml allows, in an environment of their own; they warn of newer ones they meet there
 minimal: .venv/minimal
 	.venv/oldest/bin/python -m pytest -W default $(MINIMAL)
@@ -97,6 +101,10 @@ coverage: .venv/dev kernels field
 
 .venv/docs: .venv/made pyproject.toml
 	$(INSTALL) --group docs --editable ".[contact]"
+	touch $@
+
+.venv/paper: .venv/made pyproject.toml
+	$(INSTALL) --group paper
 	touch $@
 
 clean:

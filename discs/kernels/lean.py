@@ -26,7 +26,7 @@ def is_part(library: Any) -> bool:
 @contextmanager
 def lean() -> Iterator[None]:
     """Within it numba compiles in this way, in this thread."""
-    import numba  # whole: its parts are unfinished while another thread imports it
+    import numba  # noqa: F401  # whole: its parts are unfinished while another thread imports it
     from numba.core import codegen, targetconfig
     from numba.core.typing import templates
 
@@ -69,8 +69,7 @@ def lean() -> Iterator[None]:
     def here_only(own: Callable[..., Any], ours: Callable[..., Any]) -> Callable[..., Any]:
         return lambda self, *rest: ours(own, self, *rest) if threading.get_ident() == here else own(self, *rest)
 
-    # before 0.62 numba had other passes
-    known = numba.version_info.short >= (0, 62) and all(hasattr(kind, name) for kind, name, _ in replaced)
+    known = all(hasattr(kind, name) for kind, name, _ in replaced)
     with ALONE:
         owned = [(kind, name, getattr(kind, name), ours) for kind, name, ours in replaced] if known else []
         for kind, name, own, ours in owned:

@@ -4,7 +4,6 @@ import threading
 
 import numba
 import numpy as np
-import pytest
 from numba.core import codegen
 
 from discs.kernels import compiled
@@ -59,12 +58,8 @@ def test_other_threads_compile_as_always():
     assert own(3.5) == 7.0  # parts compiled within serve code compiled without
 
 
-@pytest.mark.parametrize("older", [True, False])
-def test_another_version_of_numba_compiles_as_always(older, monkeypatch):
-    if older:  # its passes are made in another way
-        monkeypatch.setattr(numba, "version_info", numba.version_info._replace(short=(0, 61)))
-    else:
-        monkeypatch.delattr(codegen.JITCPUCodegen, "set_env")
+def test_another_version_of_numba_compiles_as_always(monkeypatch):
+    monkeypatch.delattr(codegen.JITCPUCodegen, "set_env")
     before = codegen.CPUCodeLibrary._optimize_final_module
     with lean():
         assert codegen.CPUCodeLibrary._optimize_final_module is before
