@@ -44,7 +44,7 @@ def _rows(stated: Stated) -> list[Row]:
     begin = jnp.concatenate([jnp.asarray(stated.q0), jnp.asarray(stated.u0)])
     found = []
     for name, method, steps in (
-        ("Tsit5", diffrax.Tsit5(), (800, 1600, 3200)),
+        ("Tsit5", diffrax.Tsit5(), (400, 800, 1600)),
         ("Dopri8", diffrax.Dopri8(), (200, 280, 400) if stated.law == "own" else (140, 200, 280)),
     ):
 

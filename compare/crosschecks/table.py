@@ -1,6 +1,5 @@
 """The rows of the cross-checks, and the table of them: one module a peer, a row "not installed" for a peer that is not."""
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
 from importlib import import_module, metadata
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from compare.outputs import fresh_files
-from compare.tables import format_table
+from compare.tables import aligned, markdown, write_csv
 
 # module here: (name in the table, package to import, package to install)
 PEERS = {
@@ -71,11 +70,8 @@ def crosscheck(out: str | Path, peers: Sequence[str] = tuple(PEERS), progress: b
     """All rows, written to crosschecks.md and crosschecks.csv in the folder `out`."""
     with fresh_files(out) as folder:
         found = [row for peer in tqdm(peers, desc="cross-checks", unit="peer", disable=not progress) for row in rows_of(peer)]
-        with (folder / "crosschecks.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(f.name for f in fields(Row))
-            writer.writerows(asdict(row).values() for row in found)
-        (folder / "crosschecks.md").write_text(markdown(found), encoding="utf-8")
+        write_csv(folder / "crosschecks.csv", [[f.name for f in fields(Row)], *(asdict(row).values() for row in found)])
+        (folder / "crosschecks.md").write_text(table(found) + "\n", encoding="utf-8")
     return found
 
 
@@ -83,22 +79,21 @@ def _number(value: float, digits: int) -> str:
     return "" if np.isnan(value) else f"{value:.{digits}g}"
 
 
-def markdown(rows: Sequence[Row]) -> str:
+def table(rows: Sequence[Row]) -> str:
     """The table of the documentation."""
-    head = "| with | problem | compared | ours | theirs | largest difference | order | ours, s | theirs, s | their model |"
-    lines = [head, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
+    head = "with", "problem", "compared", "ours", "theirs", "largest difference", "order", "ours, s", "theirs, s", "their model"
+    cells = []
     for row in rows:
-        values = _number(row.ours, 10), _number(row.theirs, 10), _number(row.difference, 2).replace("e-", "e−"), row.order
+        values = _number(row.ours, 10), _number(row.theirs, 10), _number(row.difference, 2), row.order
         times = _number(row.our_seconds, 2), _number(row.their_seconds, 2)
-        lines.append("| " + " | ".join((row.peer, row.problem, row.quantity, *values, *times, row.differs)) + " |")
-    return "\n".join(lines) + "\n"
+        cells.append((row.peer, row.problem, row.quantity, *values, *times, row.differs))
+    return markdown(head, cells)
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """The table for a terminal, without their models."""
-    cells: list[tuple[str, ...]] = [("with", "problem", "difference", "order", "ours, s", "theirs, s")]
-    cells += [
-        (row.peer, row.problem, _number(row.difference, 2), row.order, _number(row.our_seconds, 2), _number(row.their_seconds, 2))
-        for row in rows
-    ]
-    return format_table(cells)
+    """The table for a terminal, without what was compared and their models."""
+    cells = [("with", "problem", "difference", "order", "ours, s", "theirs, s")]
+    for row in rows:
+        times = _number(row.our_seconds, 2), _number(row.their_seconds, 2)
+        cells.append((row.peer, row.problem, _number(row.difference, 2), row.order, *times))
+    return aligned(cells)
