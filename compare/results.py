@@ -103,12 +103,12 @@ class Study:
         return [
             head,
             *(
-                (name, *(f"{e:.2e}" for e in errors), self._told(errors, orders, floor), f"{floor:.0e}")
+                (name, *(f"{e:.2e}" for e in errors), self._last_order(errors, orders, floor), f"{floor:.0e}")
                 for name, errors, orders, floor in found
             ),
         ]
 
-    def _told(self, errors: Float, orders: Float, floor: float) -> str:
+    def _last_order(self, errors: Float, orders: Float, floor: float) -> str:
         """The last order that is one of the discs, with its spread, and up to which N if the field's own error hides later ones."""
         above = np.flatnonzero(errors >= LIMITED * floor)
         last = int(above[-1]) if above.size else 0

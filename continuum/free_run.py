@@ -94,7 +94,7 @@ class Watch:
         if off > self._off:
             self._off, self._worst, self._when = off, energy, time
 
-    def said(self) -> str:
+    def warning(self) -> str:
         """The warning about the energy; empty if it was conserved."""
         if self._off <= ENERGY_DRIFT_WARNING * self._energy:
             return ""
@@ -137,7 +137,7 @@ def run(chain: Chain, start: Start, h: float, times: Float, bar: tqdm) -> Run:
     tension = np.array([system.tension(z.r, z.v) for z in found])
     names = ("x", "y", "theta", "omega", "x_rate", "y_rate", "tension")
     fields = (r[:, 0], r[:, 1], theta, omega, v[:, 0], v[:, 1], tension)
-    return Run(dict(zip(names, fields, strict=True)), np.array([system.energy(z) for z in found]), step, watch.said())
+    return Run(dict(zip(names, fields, strict=True)), np.array([system.energy(z) for z in found]), step, watch.warning())
 
 
 def compare(rod: Rod, chain: Chain, start: Start, h: float, times: Float, fine: Run, bar: tqdm) -> tuple[Errors | None, str]:

@@ -5,7 +5,7 @@ import numpy as np
 from continuum.initial import resolve
 from continuum.rod import Scene
 from discs.arrays import Bool, Complex, Float
-from discs.loads.binding import given
+from discs.loads.binding import nonzero
 
 BENT = 1e-3  # curvature times the length: above it a line counts as bent at a free end
 COMPRESSED = 0.3  # |r'| below it counts as compressed
@@ -13,7 +13,7 @@ COMPRESSED = 0.3  # |r'| below it counts as compressed
 
 def bent_hint(scene: Scene) -> str:
     """A hint for scenes that start bent at a free end, which violates the end condition x'y'' = y'x''; empty for others."""
-    curved = any(given(getattr(load, "curvature", 0.0)) for load in scene.loads)  # the end may have a curvature then
+    curved = any(nonzero(getattr(load, "curvature", 0.0)) for load in scene.loads)  # the end may have a curvature then
     if scene.closed or curved or not scene.rod.bending_stiffness or not scene.rod.radius:
         return ""
     length = scene.rod.length

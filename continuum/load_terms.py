@@ -13,7 +13,7 @@ from continuum.rod import Scene
 from discs import checks
 from discs.arrays import Complex, Float
 from discs.loads import Damping, Force, Motor, OnRod, Rest, Slope, Spring, Torque, signals
-from discs.loads.binding import given, signal_of
+from discs.loads.binding import nonzero, signal_of
 from discs.loads.signals import Signal
 
 X, Y, ROLL, TWIST = range(4)  # what a force acts on: x, y, theta, theta'
@@ -149,7 +149,7 @@ def check_taken(loads: tuple[OnRod, ...]) -> None:
 
 def _refuse_headings(load: OnRod, *names: str) -> None:
     for name in names:
-        if given(getattr(load, name)):
+        if nonzero(getattr(load, name)):
             raise ValueError(f"{type(load).__name__}: {name} is for rods with headings of their own; here they follow the line")
 
 

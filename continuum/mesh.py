@@ -14,14 +14,14 @@ from discs.arrays import Float
 from discs.chains import elements, stencils
 from discs.files.schema import ROD
 from discs.loads import Damping
-from discs.loads.binding import given
+from discs.loads.binding import nonzero
 
 UNSEEN = 1 / 4  # of an energy: discs that miss more than this do not resolve the initial fields
 
 
 def viscous(scene: Scene, *springs: str) -> bool:
     """Whether these springs, "torsion" or "bending", are viscous: stiff on a fine mesh, where steps back in time amplify."""
-    return any(given(getattr(load, spring)) for load in scene.loads if isinstance(load, Damping) for spring in springs)
+    return any(nonzero(getattr(load, spring)) for load in scene.loads if isinstance(load, Damping) for spring in springs)
 
 
 def semidiscretise(scene: Scene, n: int, ends: str, degree: int = 1) -> Problem:

@@ -213,7 +213,7 @@ def about(path: str | Path) -> str:
     if isinstance(run, Trajectory):
         told = [f"constraints of {printable(', '.join(run.owners))}"] * bool(run.owners)
     elif is_field(run):
-        told = [_told(name, value) for name, value in run.stats["scene"].items()]
+        told = [_parameter_line(name, value) for name, value in run.stats["scene"].items()]
     elif run.problem is not None:
         numbers, arrays = describe(run.problem)
         told = [f"{name} = {value}" for name, value in numbers.items() if value is not None and name != "loads"]
@@ -224,7 +224,7 @@ def about(path: str | Path) -> str:
     return "\n".join([summary(run), f"recorded: {', '.join(recorded(run))}", *told, f"made with {made}"])
 
 
-def _told(name: str, value: object) -> str:
+def _parameter_line(name: str, value: object) -> str:
     """A line for a parameter of a scene; of one that varies along the rod, a list of its values, the range."""
     if isinstance(value, list) and len(value) > 2 and all(isinstance(entry, float) for entry in value):
         return f"{printable(name)}: varies along the rod, {min(value):.6g} to {max(value):.6g}"

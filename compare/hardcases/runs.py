@@ -184,12 +184,12 @@ def march(problem: Problem, method: str, dt: float | None, seconds: float) -> tu
             return Found("refused", 0.0, seconds=spent(), says=str(error)), None
         except (SimulationError, ArithmeticError) as error:
             if method == "default" and isinstance(error, NotReached):
-                return _done(error.best, _told([*heard, error]), sum(cost)), error.best
-            says = _told([*heard, error])
+                return _done(error.best, _messages([*heard, error]), sum(cost)), error.best
+            says = _messages([*heard, error])
             return Found("stopped", getattr(error, "time", np.nan), dt or np.nan, seconds=spent(), says=says), None
         except Slow as error:
             return Found("cut off", dt=dt or np.nan, seconds=error.seconds, says="predicted from its first steps, not run"), None
-    return _done(done, _told(heard), sum(cost)), done
+    return _done(done, _messages(heard), sum(cost)), done
 
 
 def _done(run: Solution, says: str, seconds: float) -> Found:
@@ -200,7 +200,7 @@ def _done(run: Solution, says: str, seconds: float) -> Found:
     return Found("done", run.t[-1], stats["dt"], np.nan, drift, slip, stats["unconverged"], stats["steps"], seconds, says)
 
 
-def _told(heard: Sequence[warnings.WarningMessage | Exception]) -> str:
+def _messages(heard: Sequence[warnings.WarningMessage | Exception]) -> str:
     """Warnings and errors, each once."""
     return " ".join(dict.fromkeys(str(w.message) if isinstance(w, warnings.WarningMessage) else str(w) for w in heard))
 

@@ -206,7 +206,17 @@ class DOP853(SolveIvp):
 
         state = Phase(z.hi, z.lo, np.array(z.pi, ndmin=2))
         done, taken, evaluations = dop853.run(
-            dop853.coefficients(), chain, state, self.rtol, self.atol, h, bound, album.times, album.q, album.rates, album.told
+            dop853.coefficients(),
+            chain,
+            state,
+            self.rtol,
+            self.atol,
+            h,
+            bound,
+            album.times,
+            album.q,
+            album.rates,
+            album.energy_slip,
         )
         if done < 0:
             signal.raise_signal(signal.SIGINT)

@@ -85,7 +85,7 @@ def sampled(name: str, pattern: Pattern, places: Float, least: float | None = No
     return checks.field(name, values, places.size, least=least, places=places)
 
 
-def given(pattern: Pattern) -> bool:
+def nonzero(pattern: Pattern) -> bool:
     """Whether a pattern is not zero. What is no pattern counts too: it is refused where it is used."""
     try:
         return callable(pattern) or bool(np.any(pattern))

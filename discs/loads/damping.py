@@ -6,7 +6,7 @@ import numpy as np
 
 from discs.chains.chain import SteeredChain
 from discs.loads.bends import bends_of
-from discs.loads.binding import Discs, OnRod, Pattern, given, spread, within
+from discs.loads.binding import Discs, OnRod, Pattern, nonzero, spread, within
 from discs.loads.linear import Linear
 
 
@@ -40,9 +40,9 @@ class Damping(OnRod):
         links = [self._sampled(name, getattr(self, name), chain.middles, 0.0) for name in ("torsion", "bending")[: 1 + steered]]
         bends = None
         if not isinstance(chain, SteeredChain):
-            if given(self.turning):
+            if nonzero(self.turning):
                 self._needs_headings(chain, "turning")
-            if given(self.bending):
+            if nonzero(self.bending):
                 bends = bends_of(chain, viscosity=self._sampled("bending", self.bending, within(chain, chain.bends), 0.0))
         viscosity = np.zeros((len(links), chain.n + 1))
         viscosity[:, 1 : 1 + links[0].size] = np.array(links) / chain.k

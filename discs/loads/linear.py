@@ -106,14 +106,14 @@ class Linear(Load):
         object.__setattr__(self, "least", least if self.floor is None else self.floor)
 
     def potential(self, t: float, q: Float) -> float:
-        (there, slope), away = self._there, q - self.about
+        (there, slope), away = self._potential_about, q - self.about
         own = there + 0.5 * float(np.sum(self.strain**2)) + float(np.vdot(0.5 * self.stiffness * away + slope, away))
         if self.bends is not None:
             own += self.bends.potential(self.bends.rest, q)
         return own + self.driven(t, q) if self.drives else own
 
     @cached_property
-    def _there(self) -> tuple[float, Float]:
+    def _potential_about(self) -> tuple[float, Float]:
         """The potential at `about`, without strains, and its gradient there."""
         about = np.broadcast_to(self.about, self.constant.shape)
         slope = self.stiffness * about - self.constant

@@ -9,7 +9,7 @@ from discs.arrays import Float
 from discs.chains import stencils
 from discs.chains.chain import SteeredChain
 from discs.loads.bends import bends_of
-from discs.loads.binding import Discs, OnRod, Pattern, given, signal_of, spread, within
+from discs.loads.binding import Discs, OnRod, Pattern, nonzero, signal_of, spread, within
 from discs.loads.linear import Drive, Linear
 from discs.loads.signals import Signal
 
@@ -56,9 +56,9 @@ class Rest(OnRod):
             section, closing = self._section(chain), 2 * np.pi * chain.turns * float(chain.tension(rows[3])[-1])
         else:
             for name in ("stretch", "shear", "mounting_angle"):
-                if given(getattr(self, name)):
+                if nonzero(getattr(self, name)):
                     self._needs_headings(chain, name)
-            if given(self.curvature):
+            if nonzero(self.curvature):
                 curvature = self._sampled("curvature", self.curvature, within(chain, chain.bends))
                 if chain.link_law.quadratic:
                     bends = bends_of(chain, curvature=curvature)

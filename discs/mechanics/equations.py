@@ -46,7 +46,7 @@ from discs.arrays import Float, Matrix
 from discs.mechanics import saddle
 from discs.mechanics.bodies import Bodies
 from discs.mechanics.derivatives import Formula
-from discs.mechanics.inputs import Given, function_of, given
+from discs.mechanics.inputs import Given, as_given, function_of
 from discs.mechanics.saddle import dense
 
 
@@ -100,11 +100,11 @@ class Equations:
         m, c = len(names), len(owners)
         function_of("q, v", "force", self.force)
         parts: dict[str, Any] = {"names": names, "owners": owners}
-        parts["drive"] = given("t, q", "b", self.drive, c, m) if callable(self.drive) else checks.field("drive", self.drive, c)
+        parts["drive"] = as_given("t, q", "b", self.drive, c, m) if callable(self.drive) else checks.field("drive", self.drive, c)
         if self.applied is not None:
-            parts["applied"] = given("t, q, v", "f", self.applied, m, m)
+            parts["applied"] = as_given("t, q, v", "f", self.applied, m, m)
         if self.phi is not None:
-            parts |= {"phi": given("q, v", "phi", self.phi, c, m), "constraint": _not_linear, "constraint_rate": _not_linear}
+            parts |= {"phi": as_given("q, v", "phi", self.phi, c, m), "constraint": _not_linear, "constraint_rate": _not_linear}
         if callable(self.bodies):
             parts["bodies"] = Bodies(self.bodies)
         for name, value in parts.items():

@@ -69,6 +69,6 @@ class Given:
         return self.formula.along(np.hstack(at), np.hstack(direction))
 
 
-def given(arguments: str, name: str, call: Any, size: int, m: int) -> Given:
+def as_given(arguments: str, name: str, call: Any, size: int, m: int) -> Given:
     """A user's function as `Given`, which may be one already."""
     return call if isinstance(call, Given) else Given(arguments, name, call, size, m)

@@ -29,7 +29,7 @@ class Album:
     ----------
     times : (F,). steps, rests : (F,), the whole steps before each frame, and the time from there. done : number of frames recorded.
     q, rates : (rows, F, n), (rows - 2, F, n), positions, and rates of the rows from theta on.
-    told : (2, F), energy and largest slip.
+    energy_slip : (2, F), energy and largest slip.
     """
 
     def __init__(self, system: RollingDiscs, times: Float, h: float) -> None:
@@ -39,15 +39,15 @@ class Album:
         rows, n, self.done = len(system.rows), system.n, 0
         if times.size > 1:
             checks.fits(f"frames = {times.size}", (2 * rows * n + 2) * times.size)
-        self.q, self.told = np.empty((rows, times.size, n)), np.empty((2, times.size))
+        self.q, self.energy_slip = np.empty((rows, times.size, n)), np.empty((2, times.size))
         self.rates = np.empty((rows - 2, times.size, n))
 
-    def given(self, first: int, stuck: int) -> Stops:
+    def arguments(self, first: int, stuck: int) -> Stops:
         """The arguments about frames for compiled steps, after `first` steps, of which `stuck` did not converge.
 
         The steps end when that number has doubled, so that `March` can remember where it was.
         """
-        return max(stuck, 1), first, self.done, self.steps, self.rests, self.q, self.rates, self.told
+        return max(stuck, 1), first, self.done, self.steps, self.rests, self.q, self.rates, self.energy_slip
 
     def write(self, found: dict[str, Any]) -> None:
         """Store the next frame, if compiled steps left it."""
@@ -58,4 +58,4 @@ class Album:
     @property
     def rows(self) -> dict[str, Float]:
         """The frames, by the names of their quantities."""
-        return dict(zip(self.names, [*self.q, *self.rates, *self.told], strict=True))
+        return dict(zip(self.names, [*self.q, *self.rates, *self.energy_slip], strict=True))

@@ -94,8 +94,8 @@ class Recording(Rows):
         super().__init__(problem, times)
         self.path, self.about, self.estimate = archive.named(path), about, estimate
         self.restart = Restart(self.path)
-        self.told = _told(problem, times, about)
-        self.run = hashlib.sha256(repr(sorted(self.told.items())).encode()).hexdigest()  # names it in the restart file
+        self.identity = _identity(problem, times, about)
+        self.run = hashlib.sha256(repr(sorted(self.identity.items())).encode()).hexdigest()  # names it in the restart file
         self.file: FrameFile | None = None
         self.step = 0  # of the last restart file
         self.empty = False  # whether the file was created here and has no frames yet
@@ -234,7 +234,7 @@ class Recording(Rows):
         """Raise ValueError unless the file holds the same run."""
         if file.problem is None:
             raise ValueError(f"{self.path} holds a field; give another path, or delete it")
-        there, here = _told(file.problem, file.static["time"], file.attrs["stats"]), self.told
+        there, here = _identity(file.problem, file.static["time"], file.attrs["stats"]), self.identity
         for name in {**there, **here}:
             one, other = there.get(name), here.get(name)
             if one != other:
@@ -246,7 +246,7 @@ class Recording(Rows):
                 raise ValueError(f"{self.path} holds another run, whose {name} differs{words}; give another path, or delete it")
 
 
-def _told(problem: Problem, times: Float, stats: Stats) -> dict[str, str | bytes]:
+def _identity(problem: Problem, times: Float, stats: Stats) -> dict[str, str | bytes]:
     """All that identifies a run, by name: a hash of each array, the rest as text."""
     numbers, arrays = schema.describe(problem)
     told = {name: stats.get(name) for name in SETTINGS} | numbers

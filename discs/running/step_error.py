@@ -63,7 +63,7 @@ class Watch:
         self.places = np.empty((count if self.short else 1, rows, n))
         self.defects = np.empty((count, 2, rows))
 
-    def given(self, first: int) -> Looks:
+    def arguments(self, first: int) -> Looks:
         """The arguments about looks for compiled steps, after `first` steps."""
         k = self.passed
         return first, self.looks[k:], self.places[k if self.short else 0 :], self.defects[k:], self.limit

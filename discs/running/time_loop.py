@@ -127,8 +127,8 @@ class March:
             else:
                 steps = min(self.chunk, step - self.step)
                 if watch is not None:
-                    steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.given(self.step))
-                stops = NO_STOPS if album is None else album.given(self.step, self.work.unconverged)
+                    steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.arguments(self.step))
+                stops = NO_STOPS if album is None else album.arguments(self.step, self.work.unconverged)
                 self.memory, tally = self.twin.march(
                     self.system, self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks, stops
                 )

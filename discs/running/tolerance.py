@@ -174,12 +174,12 @@ def search(
     integrator, *higher = methods_for(method, least_tol, len(problem.system.rows))
     if not times[-1]:
         start = yield problem, integrator, problem.duration / FEWEST, times
-        return _told(start, dict.fromkeys(estimates.compared(start), 0.0), tol, 1, "fewest steps")
+        return _with_search(start, dict.fromkeys(estimates.compared(start), 0.0), tol, 1, "fewest steps")
     end, some, made = float(times[-1]), some_of(times), 0
     if method == "auto" and explicit and some.size == times.size:
         fitting, known, made = yield from search_explicit(problem, bound, times)
         if fitting is not None:
-            return _told(fitting, known, tol, made, "fewest steps" if made == 2 else "tolerance")
+            return _with_search(fitting, known, tol, made, "fewest steps" if made == 2 else "tolerance")
     steps = _fewest(problem, integrator, end)
     runs: list[Solution] = []  # of one method, at most three, with shorter and shorter steps
     sweeps: dict[float, Integrator] = {}  # the method with its tolerance of sweeps, by the step of a run
@@ -187,11 +187,11 @@ def search(
     failure: SimulationError | None = None
     looked, stalls, failures, best_yet, looks = False, 0, 0, np.inf, Looks(problem, end)
 
-    def told(longer: Solution, shorter: Solution, limit: str) -> Solution:
+    def result(longer: Solution, shorter: Solution, limit: str) -> Solution:
         """The run with longer steps, with estimates of all its errors."""
         order = estimates.orders(runs[0], runs[1], runs[2], integrator.order) if len(runs) == 3 else {}
         errors = estimates.errors(longer, shorter, order, sweeps[longer.stats["dt"]].sweep_tolerance)
-        return _told(longer, errors, tol, made + attempt, limit)
+        return _with_search(longer, errors, tol, made + attempt, limit)
 
     for attempt in range(1, ATTEMPTS + 1):
         dt = end / steps
@@ -230,7 +230,7 @@ def search(
         left = estimates.worst(estimates.unswept(longer, swept), bound, size)
         limit = "fewest steps" if first else "sweeps" if left > worst / 2 else "tolerance"
         if worst <= 1:
-            return told(longer, shorter, limit)
+            return result(longer, shorter, limit)
         seen = 1.0 if first else order[max(bound, key=lambda name: errors[name] / bound[name] / size[name])]
         stalls = stalls + 1 if not first and (seen <= LEAST_ORDER or worst >= best_yet) else 0
         best_yet = min(best_yet, worst)
@@ -238,7 +238,7 @@ def search(
         if looks.wanted(relative):
             until = yield from looks.look({name: tolerance * size[name] for name, tolerance in bound.items()})
             if until < end:
-                raise NotReached(least_tol, worst, longer.stats["dt"], None, told(longer, shorter, limit), attempt, until)
+                raise NotReached(least_tol, worst, longer.stats["dt"], None, result(longer, shorter, limit), attempt, until)
         due = not looked and (attempt >= LATE or least_tol < FINE)
         resolved = due and relative < RESOLVED
         if resolved or (stalls and not higher):
@@ -248,7 +248,7 @@ def search(
             if sharp.sweep_tolerance <= estimates.LEAST_SWEPT:  # sweeps that converged to rounding
                 floor = max(floor, estimates.worst(estimates.unswept(found, sharp.sweep_tolerance), bound, size))
             if floor > (1 if resolved else worst / 10):
-                raise NotReached(least_tol, worst, longer.stats["dt"], floor, told(longer, shorter, limit), attempt)
+                raise NotReached(least_tol, worst, longer.stats["dt"], floor, result(longer, shorter, limit), attempt)
         if stalls >= 2 and higher:
             integrator, *higher = higher
             steps, runs, stalls, best_yet = max(FEWEST, steps // 4), [], 0, np.inf
@@ -260,7 +260,7 @@ def search(
         steps = int(np.ceil(2.0 ** (np.ceil(COARSE * np.log2(wanted)) / COARSE) if coarse else wanted))
     if len(runs) < 2:
         raise failure or SimulationError(f"steps do not converge, down to dt = {dt:g}; take another method", 0, 0.0, 0)
-    raise NotReached(least_tol, worst, longer.stats["dt"], None, told(longer, shorter, limit), ATTEMPTS)
+    raise NotReached(least_tol, worst, longer.stats["dt"], None, result(longer, shorter, limit), ATTEMPTS)
 
 
 def some_of(times: Float) -> Float:
@@ -278,7 +278,7 @@ def _usual(order: int) -> float:
     return min(order, 2 + order / 3)
 
 
-def _told(run: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int, limit: str) -> Solution:
+def _with_search(run: Solution, errors: dict[str, float], tol: float | Mapping[str, float], attempts: int, limit: str) -> Solution:
     """The run with its estimates and the stats of the search."""
     told: Stats = {"tol": dict(tol) if isinstance(tol, Mapping) else tol, "attempts": attempts, "limited_by": limit}
     return replace(run, error_estimate=errors, stats=run.stats | told)
