@@ -85,7 +85,7 @@ def test_tolerance_own_headings_and_overwrite(tmp_path, capsys):
         (["run", "--want", "colour"], "want must be one of"),
         (["run", "--overwrite"], "--overwrite goes with --save FILE"),
         (["run", "--save", "missing/run.nc"], "cannot be written"),
-        (["run", "--n", str(10**14)], "too large for this machine's memory"),
+        (["run", "--n", str(10**14)], "GB are needed, and this machine has"),
         (["info", "missing.nc"], "cannot be read"),
         (["plot", "missing.nc"], "cannot be read"),
     ],
