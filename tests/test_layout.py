@@ -1,4 +1,4 @@
-"""The arrows between modules: what may import what, and no circles but those of a lazy facade."""
+"""The arrows between modules and rooms: what may import what, and no circles but those of a lazy facade."""
 
 import ast
 from functools import cache
@@ -19,6 +19,26 @@ FACADES = {
 
 # A link law takes a chain, which finds the law by its name: only the type is imported.
 FACADES |= {f"discs.chains.links.{law}": ("discs.chains.chain",) for law in ("law", "linear", "true")}
+# The rooms of `discs`, from the ground up. A module imports from its own room and from those before it,
+ROOMS = (
+    *("arrays", "warn", "differences", "checks", "skew", "kernels", "chains", "loads", "problem", "energy_by_kind"),
+    *("integrators", "solution", "mechanics", "pictures", "files", "runs", "running", "linkage", "events", "simulation"),
+    *("analysis", "command_line"),
+)
+# but for these arrows up, each with its reason.
+UP = {
+    ("kernels", "chains"): "the compiled form of a chain is made from the chain",
+    ("kernels", "integrators"): "kernels of gradients follow a method's compiled step, which stands beside the plain one",
+    ("chains", "problem"): "`twist` makes the problems of the command line and of examples",
+    ("loads", "files"): "`tables` reads files of signals",
+    ("solution", "running"): "`stats`, what every run says of itself",
+    ("mechanics", "running"): "`stats`; sliding discs are a run with frames",
+    ("pictures", "running"): "`stats`",
+    ("files", "running"): "`stats`",
+    ("pictures", "files"): "`schema`, the units of quantities",
+    ("runs", "running"): "`outcome`, the blocks of many runs",
+    ("running", "simulation"): "`simulate_many` runs by `simulate` what does not fit side by side",
+}
 # What is slow to import, or an extra: functions import it when they need it.
 LATE = ("discs.kernels", "continuum.kernels", "compare.peers", "compare.figures", "compare.limit_figures", "compare.lab")
 
@@ -55,6 +75,15 @@ def test_packages_import_only_what_lies_below_them():
     for module in MODULES:
         outside = {name for name in arrows(module) if name.partition(".")[0] not in BELOW[module.partition(".")[0]]}
         assert not outside, f"{module} imports {outside}"
+
+
+def test_rooms_import_from_those_below_them():
+    inside = [module for module in MODULES if module.count(".") and not module.endswith("__main__")]
+    pairs = {
+        (m.split(".")[1], t.split(".")[1]) for m in inside for t in arrows(m) if m.startswith("discs") and t.startswith("discs.")
+    }
+    assert {room for pair in pairs for room in pair} == set(ROOMS), "a new room needs its place in ROOMS"
+    assert {(one, other) for one, other in pairs if ROOMS.index(other) > ROOMS.index(one)} == UP.keys()
 
 
 def test_no_circles_of_modules():
