@@ -65,7 +65,7 @@ def ends(run: Solution) -> Float:
 def fixed(problem: Problem, exact: Float) -> list[Run]:
     """Runs of all methods, until their error is below the least tolerance."""
     found: list[Run] = []
-    for peer in [explicit(problem), *reversed([peer for peer in ours(problem) if peer.name not in OMITTED])]:
+    for peer in [*reversed([peer for peer in ours(problem) if peer.name not in OMITTED]), explicit(problem)]:
         for setting in peer.settings:
             try:
                 times = [peer.run(setting, np.inf) for _ in range(2)]
