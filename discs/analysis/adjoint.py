@@ -55,7 +55,8 @@ def gradient(
     ----------
     problem : the chain, its initial state, loads and duration; without motors.
     cost : of the frames, as `lambda run: run.y[-1, 0] ** 2`: a function of run.t, (F,), and of run.x, y, theta, omega (phi,
-        phi_rate), (F, n), written in NumPy. It is differentiated by dual numbers (`discs.analysis.duals`).
+        phi_rate), (F, n), written in NumPy. It is differentiated by dual numbers (`discs.analysis.duals`). It may be None if
+        `cost_gradient` is given.
     wrt : names: of the initial state, "x", "y", "theta", "omega" ("phi", "phi_rate"), the others held; or of the chain, "radius",
         "density", "spin_inertia", "torsion_stiffness", "bending_stiffness" ("heading_inertia", "stretch_stiffness",
         "shear_stiffness"), the initial state held; or of a load and its signal, as "loads[0].pattern", "loads[1].signal.rate",
@@ -82,8 +83,8 @@ def gradient(
     """
     if not isinstance(problem, Problem):
         raise ValueError(f"gradient takes a Problem, as `compare.lump(scene, n)` makes; got {checks.shown(problem)}")
-    for name, function in (("cost", cost), ("cost_gradient", cost_gradient)):
-        if not (callable(function) or (function is None and name == "cost_gradient")):
+    for name, function, other in (("cost", cost, cost_gradient), ("cost_gradient", cost_gradient, cost)):
+        if not (callable(function) or (function is None and other is not None)):
             raise ValueError(f"{name} must be a function of a run; got {checks.shown(function)}")
     names = _names(problem, wrt)
     integrator = _checked(problem, method)
