@@ -38,8 +38,8 @@ def overview(
     """Compare a scene's discs with its field; write the table and the pictures to `out`.
 
     Writes convergence.csv, convergence.png, limits-of-all.png (velocities, slopes, energy and the ground's force), motion.png and
-    energy.png. The energy is shown over 33 times the scene's duration,
-    [0, 150] for the paper's, and over the duration itself for a closed rod (under the unit law a ring collapses).
+    energy.png. The energy is shown over 33 times the scene's duration, [0, 150] for the paper's, and over the duration itself for a
+    closed rod (under the unit law a ring collapses).
 
     Parameters
     ----------

@@ -5,9 +5,8 @@ tolerance of 1e-2 to 1e-8; both are log-uniform. The reference is "gauss8" with 
 result, which is eight times shorter than any step of its search, or more. The error of the reference is its difference from a run
 with half as many steps. A reference whose error is more than a fifth of the tolerance is not used.
 
-A refusal must be justified. That rounding is the limit is shown by the search itself. A lost
-heading is checked by "gauss8" with steps three times shorter than those that lost it: a heading must be lost again, at the same
-time.
+A refusal must be justified. The search itself shows whether rounding is the limit. A lost heading is checked by "gauss8" with steps
+three times shorter than those that lost it: a heading must be lost again, at the same time.
 """
 
 import time as clock

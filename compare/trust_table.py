@@ -22,8 +22,7 @@ class Row(NamedTuple):
         "simulate".
     tol : the tolerance, absolute for fields, relative to the largest value of each quantity for discs. outcome : one of OUTCOMES.
     error, estimate : the largest over positions and angles, in the units of tol; NaN if unknown. ratio : estimate over error, NaN
-        if
-    the error is too small to be known. seconds : processor time. reference, reference_error : the reference, and its error.
+        if the error is too small to be known. seconds : processor time. reference, reference_error : the reference, and its error.
     unlike : difference of the chains from the finer field, over the error of the chains. says : text of the refusal, or warnings.
     shown : result of the chains after a refusal. limited : `limited_by` of the stats of a run; empty for fields.
     """

@@ -2,8 +2,8 @@ r"""A test for stiffness: whether an implicit method is faster.
 
 Hairer's test: with two stages y_1, y_2 at the end of a step h, h |f(y_1) - f(y_2)|/|y_1 - y_2| estimates h times the largest
 eigenvalue. If it stays above 6.1, the limit of DOP853's stability, in 15 steps (and not below in 6 in a row), the steps are
-limited by stability. Radau is then tried for 24 steps, and taken if the second half of them advances at least
-twice as far per evaluation.
+limited by stability. Radau is then tried for 24 steps, and taken if the second half of them advances at least twice as far per
+evaluation.
 
 Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.2.
 """
