@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """Command line of `compare`: the main job, and the commands of `compare.commands`."""
 
 import argparse

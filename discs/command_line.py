@@ -1,6 +1,7 @@
 """Shared parts of the command lines: options of a run, descriptions of files, exit codes."""
 
 import argparse
+import os
 import sys
 import warnings
 from dataclasses import replace
@@ -254,6 +255,10 @@ def failed(error: object, code: int) -> int:
 
 def main(parser: argparse.ArgumentParser, arguments: list[str] | None) -> int:
     """Run a command line; returns the exit code: 0 done, 1 the motion could not be continued, 2 bad input, 130 interrupted."""
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks, by argcomplete
+        import argcomplete
+
+        argcomplete.autocomplete(parser)
     options = parser.parse_args(arguments)
     formatted, warnings.formatwarning = warnings.formatwarning, lambda message, *_: f"warning: {message}\n"
     try:

@@ -1,6 +1,7 @@
 """`python -m discs` as a user meets it."""
 
 import argparse
+import os
 import re
 import shlex
 import signal
@@ -207,3 +208,13 @@ def test_a_rolling_circle(law, tmp_path, capsys):
     assert (r[-1, 0] - r[0, 0]) / 0.0002 == pytest.approx(-0.7 * 0.3 * stretched, rel=2e-3)
     assert main(["run", "--ring", "0.3", "--twist", "1"]) == 2
     assert "--ring takes no --twist and no --ends" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("line", "offered"), [("python -m discs mo", ["modes"]), ("python -m continuum solve --to", ["--tol"])])
+def test_shells_complete(tmp_path, line, offered):
+    pytest.importorskip("argcomplete", reason="needs argcomplete, of the extra completion")
+    asks = {"_ARGCOMPLETE": "3", "_ARGCOMPLETE_STDOUT_FILENAME": str(tmp_path / "offered"), "_ARGCOMPLETE_IFS": "\n"}
+    asks |= {"COMP_LINE": line, "COMP_POINT": str(len(line)), "COMP_TYPE": "9"}
+    subprocess.run([sys.executable, *line.split()[1:3]], env=os.environ | asks, check=True)
+    assert (tmp_path / "offered").read_text().split() == offered
