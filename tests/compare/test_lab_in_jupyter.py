@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests.compare.test_lab_in_browser import ask, until
+from tests.discs.test_view_for_readers import CONTRAST, device
 
 for needed in ("jupyterlab", "anywidget", "ipywidgets"):
     pytest.importorskip(needed, reason="needs the extra notebooks")
@@ -59,6 +60,12 @@ def test_a_cell_shows_discs_that_move(browser, address):
     until(browser, "document.body.innerText.includes('Idle')")
     run(0)
     until(browser, "document.querySelector('.discs-lab .title')?.textContent.includes('9 discs')")
+    with device(browser, 1400, 1000, prefers_color_scheme="dark", prefers_reduced_motion="reduce"):
+        ratios = browser.execute_script(CONTRAST.replace("body *", ".discs-lab *"))
+        assert min(ratio for _, ratio in ratios) >= 4.5, ratios
+        assert (
+            ask(browser, "getComputedStyle(document.querySelector('.discs-lab')).backgroundColor") == "rgb(252, 252, 250)"
+        )  # as JupyterLab is
     time, energy = (f"document.querySelector('.discs-lab .{name}').textContent" for name in ("time", "numbers"))
     browser.find_element("xpath", "//button[.='Step']").click()  # less motion is asked for, so the discs wait
     until(browser, f"{time} === 't = 0.01'")

@@ -466,6 +466,8 @@ function render({ model, el, whole = false }) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const repaint = () => { if (stage) { stage.paint(panels); arrows?.material.color.set(tone("push")); } };
   dark.addEventListener("change", repaint);
+  const theme = new MutationObserver(repaint);
+  theme.observe(document.body, { attributeFilter: ["data-jp-theme-light"] });
   let alive = true, written = 0, unwritten = false;
   requestAnimationFrame(function each(now) {
     if (!alive) return;
@@ -488,6 +490,7 @@ function render({ model, el, whole = false }) {
     alive = false;
     sized.disconnect();
     dark.removeEventListener("change", repaint);
+    theme.disconnect();
     listens.removeEventListener("keydown", keys, true);
     stage?.close();
     root.remove();
