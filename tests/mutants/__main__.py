@@ -3,9 +3,10 @@
     python -m tests.mutants --seed 1 --each 10        # ten of every place of PLACES, drawn by the seed
     python -m tests.mutants --only loads --each 30
 
-Not part of the tests: it takes a minute for a mutant. Files are changed in place, one line at a time, and restored; the checkout
-must be clean. Kernels run as plain Python (NUMBA_DISABLE_JIT=1), so nothing compiles. A mutant is killed when a test fails or takes
-four times as long as without it. Survivors are printed as a table, to be explained, or killed by a new test.
+Not part of the tests: a mutant takes some seconds. Files are changed in place, one line at a time, and restored; the checkout must
+be clean. Where kernels would be compiled again for a mutant, they run as plain Python (NUMBA_DISABLE_JIT=1). A mutant is killed
+when a test fails, or the tests take four times as long as without it. Survivors are printed when they are found, to be examined
+with more tests, explained, or killed by a new test: docs/mutants.md has the results.
 """
 
 import argparse
@@ -26,10 +27,16 @@ class Place(NamedTuple):
     """A part of the packages, and the tests that are to notice its faults."""
 
     files: str  # patterns, apart by spaces
-    tests: str
+    tests: str  # so are these
     plain: bool = False  # numba switched off
+    slow: bool = False  # slow tests too, as there are few others
+    only: str = ""  # names of tests, as for `pytest -k`
 
 
+KERNELS = (
+    "twins and (midpoint or gauss4 or elements) or elimination or reduced or balance or sweeps_solve or compiled_gradients"
+    " or in_lanes and (gauss4 or loads) or lanes_and or belongs"
+)
 D, C = "tests/discs/test_", "tests/continuum/test_"
 PLACES = {
     "mechanics": Place(
@@ -39,18 +46,22 @@ PLACES = {
     "chains": Place(
         "discs/chains/*.py discs/chains/rolling/*.py discs/chains/links/*.py",
         f"{D}stencils.py {D}laws.py {D}linear.py {D}motion.py",
-    ),
-    "integrators": Place("discs/integrators/*.py", f"{D}integrators.py {D}radau.py {D}dop853.py {D}step.py"),
-    "kernels": Place(
-        "discs/kernels/slaved*.py discs/kernels/steered*.py discs/kernels/banded.py",
-        f"{D}kernels.py {D}simulate.py",
         plain=True,
     ),
-    "solver": Place("continuum/*.py", f"{C}spectral.py {C}solve.py {C}exact.py {C}steered.py {C}ground.py"),
+    "integrators": Place("discs/integrators/*.py", f"{D}integrators.py {D}radau.py {D}dop853.py {D}step.py", plain=True),
+    "kernels": Place(
+        "discs/kernels/slaved*.py discs/kernels/steered*.py discs/kernels/banded.py",
+        f"{D}kernels.py {D}elements.py {D}lanes.py {D}steered_lanes.py {D}loads_in_lanes.py {D}gradient.py {D}tangent.py",
+        plain=True,
+        slow=True,
+        only=KERNELS,
+    ),
+    "solver": Place("continuum/*.py", "tests/continuum/test_*.py"),
     "archives": Place("discs/files/*.py", f"{D}archive.py {D}files.py {D}untrusted.py {D}restart.py {D}finishing.py"),
     "sweeps": Place(
         "compare/sweeps.py compare/lump.py compare/study.py",
         "tests/compare/test_sweeps.py tests/compare/test_convergence.py",
+        slow=True,
     ),
     "loads": Place("discs/loads/*.py", f"{D}loads.py {D}loads_known.py {D}nonlinear.py {D}motors.py {D}signals.py {D}bends.py"),
 }
@@ -79,16 +90,17 @@ def drawn(place: str, count: int, rng: random.Random) -> list[Mutant]:
     return rng.sample(found, min(count, len(found)))
 
 
-def passes(place: Place, limit: float | None = None) -> bool:
-    """Whether the tests of a place pass within `limit` seconds."""
+def passes(place: Place, limit: float | None = None, first: str = "") -> bool:
+    """Whether the tests of a place pass; those whose files have the word `first` in their names go first.
+
+    limit : seconds, after which they are stopped: subprocess.TimeoutExpired.
+    """
     environment = os.environ | ({"NUMBA_DISABLE_JIT": "1"} if place.plain else {}) | {"PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", "-o", "addopts="]
-    command += ["-m", "not slow and not long", *place.tests.split()]
-    try:
-        run = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=limit, check=False)
-    except subprocess.TimeoutExpired:
-        return False
-    return run.returncode == 0
+    command += ["-m", "not long" if place.slow else "not slow and not long", "-k", place.only]
+    files = [str(file) for tests in place.tests.split() for file in sorted(ROOT.glob(tests))]
+    command += sorted(files, key=lambda file: first not in file.rpartition("/")[2])
+    return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=limit, check=False).returncode == 0
 
 
 def killed(mutant: Mutant, limit: float) -> bool:
@@ -96,7 +108,10 @@ def killed(mutant: Mutant, limit: float) -> bool:
     source = mutant.file.read_text(encoding="utf-8")
     try:
         mutant.file.write_text(applied(source, mutant.change), encoding="utf-8")
-        return not passes(PLACES[mutant.place], limit)
+        return not passes(PLACES[mutant.place], limit, mutant.file.stem.partition("_")[0])
+    except subprocess.TimeoutExpired:
+        print(f"more than {limit:.0f} s:", end=" ")
+        return True
     finally:
         mutant.file.write_text(source, encoding="utf-8")
 
@@ -111,18 +126,18 @@ def main() -> None:
     chosen = p.parse_args()
     if subprocess.run(["git", "status", "--porcelain", "*.py"], cwd=ROOT, capture_output=True, text=True, check=True).stdout:
         raise SystemExit("commit or stash first: files are changed in place")
-    print("| place | mutants | killed |\n| --- | --- | --- |")
-    survivors: list[Mutant] = []
     for name in chosen.only:
         begun = time.monotonic()
         if not passes(PLACES[name]):
             raise SystemExit(f"the tests of {name} fail without a mutant")
         limit = 4 * (time.monotonic() - begun) + 20
         mutants = drawn(name, chosen.each, random.Random(f"{name} {chosen.seed}"))
-        alive = [mutant for mutant in mutants if not killed(mutant, limit)]
-        survivors += alive
-        print(f"| {name} | {len(mutants)} | {len(mutants) - len(alive)} |", flush=True)
-    print("\n| survivor | line | changed to |\n| --- | --- | --- |", *(mutant.row() for mutant in survivors), sep="\n")
+        alive = 0
+        for i, mutant in enumerate(mutants):
+            dead = killed(mutant, limit)
+            alive += not dead
+            print(f"{name} {i + 1} {'killed' if dead else 'SURVIVED'}", mutant.row(), flush=True)
+        print(f"{name}: {len(mutants)} mutants, {len(mutants) - alive} killed", flush=True)
 
 
 if __name__ == "__main__":
