@@ -48,6 +48,15 @@ def test_a_bent_rod_that_turns_dissipates_nothing(model):
     assert bending > 0.1
 
 
+def test_a_straight_closed_rod_is_bent_by_its_rest_curvature_alike_everywhere(rolling):
+    """K kappa_0^2 / 2 for each length, at the seam too, and no force across the rod."""
+    chain = Chain(n=12, rolling=rolling, ends="ring", shift=(3.0, 0.0), **UNEVEN)
+    problem = Problem(chain, State(chain.s, 0 * chain.s, 0 * chain.s), 1.0, (Rest(curvature=0.7),))
+    assert problem.energy() == pytest.approx(0.5 * 0.5 * 0.7**2 * 3.0)
+    force = problem.system.load.force(0.0, problem.start().hi, np.zeros((3, 12)))
+    np.testing.assert_allclose(force[1], 0.0, atol=1e-12)
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:suzuki4. its substeps back in time amplify")  # short waves, which are not excited
 @pytest.mark.long

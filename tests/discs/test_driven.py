@@ -247,12 +247,21 @@ def test_forces_and_drives_agree_with_the_reduced_form():
     assert saddle.acceleration[2] == pytest.approx(np.cos(t) + v[0], abs=1e-14)
 
 
-@pytest.mark.long
-def test_a_vakonomic_drive():
+def rail():
     """y. = sin x + t: the action of L + mu (y. - sin x - t), Euler-Lagrange x.. = -mu cos x and y. + mu = const."""
-    system = MechanicalSystem.from_lagrangian(
+    return MechanicalSystem.from_lagrangian(
         ("x", "y"), np.eye(2), lambda q: 0.0, lambda q: [[0, 1]], "rail", lambda t, q: np.sin(q[0]) + t
     )
+
+
+def test_a_charge_pushes_where_the_drive_changes():
+    found = rail().accelerations([0.3, 2.0], [0.8, np.sin(0.3) + 0.7], [0.4], 0.7)
+    np.testing.assert_allclose(found.acceleration, [-0.4 * np.cos(0.3), 0.8 * np.cos(0.3) + 1], atol=1e-12)
+
+
+@pytest.mark.long
+def test_a_vakonomic_drive():
+    system = rail()
     path = system.integrate([0.3, 0], [0.8, np.sin(0.3)], TIMES, mu=[0.4], progress=False)
     whole = np.sin(0.3) + 0.4
 

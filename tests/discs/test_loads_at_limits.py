@@ -37,6 +37,16 @@ def test_stiff_springs_keep_the_balance_far_from_the_origin():
     assert abs(off).max() < 1e-12 * abs(run.energy).max()
 
 
+def test_weak_springs_far_from_the_origin_keep_their_digits():
+    """0.15 d^2 for each length, d = 0.1, although 0.15 x^2 is 1e11 here."""
+    problem = uneven(5, Model("springs", "field"))
+    start = replace(problem.initial, x=np.asarray(problem.initial.x) + 1e6)
+    problem = replace(problem, initial=start, loads=(Spring(start.x, start.y, 0.1), Spring(start.x, start.y, 0.2)))
+    load, q = problem.system.load, problem.start().hi
+    change = load.potential(0.0, np.add(q, [[0.1], [0.0], [0.0]])) - load.potential(0.0, q)
+    assert change == pytest.approx(0.15 * 0.1**2 * 3.1, rel=1e-6)
+
+
 def test_dampers_that_give_energy_are_told():
     problem = replace(uneven(5, Model("springs", "field")), loads=(Damping(rolling=1.0),), duration=0.5)
     run = simulate(problem, "midpoint", 0.05, frames=6, progress=False, engine="plain")
@@ -61,11 +71,11 @@ def test_frames_between_steps_do_not_make_dampers_give_energy():
     assert "dampers only take energy" in doubted(problem, replace(run, stats=run.stats | {"method": "midpoint"}))
 
 
-@pytest.mark.parametrize("at", [0.0, 0.05, 3.95, 4.0])
+@pytest.mark.parametrize("at", [0.0, 0.05, 3.6, 3.8, 3.95, 4.0])
 def test_a_spring_at_the_seam_of_a_periodic_rod_holds_the_disc_that_is_there(at):
     s = np.arange(16) / 4
     chain = Chain(**STRAIGHT, n=16, ends="ring", shift=(4.0, 0.0))
-    spring = Spring(x=0.0 if at < 2 else 4.0, y=0.0, stiffness=5.0, at=at)
+    spring = Spring(x=round(4 * at) / 4, y=0.0, stiffness=5.0, at=at)
     problem = Problem(chain, State(s, 0 * s, 0 * s), 1.0, (spring,))
     assert problem.energy() == 0
     assert np.abs(problem.system.load.force(0.0, problem.start().hi, np.zeros((3, 16)))).max() == 0
