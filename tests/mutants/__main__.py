@@ -18,6 +18,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+import pytest
+
 from tests.mutants.changes import Change, applied, changes
 
 ROOT = Path(__file__).parents[2]
@@ -28,8 +30,8 @@ class Place(NamedTuple):
 
     files: str  # patterns, apart by spaces
     tests: str  # so are these
+    more: str = ""  # tests for what survives those; slow ones of both are then run too
     plain: bool = False  # numba switched off
-    slow: bool = False  # slow tests too, as there are few others
     only: str = ""  # names of tests, as for `pytest -k`
 
 
@@ -41,29 +43,43 @@ D, C = "tests/discs/test_", "tests/continuum/test_"
 PLACES = {
     "mechanics": Place(
         "discs/mechanics/*.py discs/skew.py",
-        f"{D}mechanics.py {D}system.py {D}textbook.py {D}momentum.py {D}vakonomic.py {D}friction.py {D}sliding.py {D}driven.py",
+        f"{D}mechanics.py {D}system.py {D}textbook.py {D}momentum.py {D}friction.py {D}sliding.py {D}contact.py",
+        f"{D}vakonomic.py {D}driven.py {D}trajectory.py tests/compare/test_quantities.py",
     ),
     "chains": Place(
         "discs/chains/*.py discs/chains/rolling/*.py discs/chains/links/*.py",
-        f"{D}stencils.py {D}laws.py {D}linear.py {D}motion.py",
+        f"{D}stencils.py {D}laws.py {D}linear.py {D}motion.py {D}elements.py {D}true_curvature.py",
+        f"{D}kernels.py {D}modes.py {D}tangent.py {D}gradient.py {D}kinds_of_loads.py",
         plain=True,
     ),
-    "integrators": Place("discs/integrators/*.py", f"{D}integrators.py {D}radau.py {D}dop853.py {D}step.py", plain=True),
+    "integrators": Place(
+        "discs/integrators/*.py",
+        f"{D}integrators.py {D}radau.py {D}dop853.py {D}step.py",
+        f"{D}kernels.py {D}simulate.py {D}restart.py {D}tolerance.py {D}kinds_of_loads.py {D}work_by_load.py {D}own_integrator.py",
+        plain=True,
+    ),
     "kernels": Place(
         "discs/kernels/slaved*.py discs/kernels/steered*.py discs/kernels/banded.py",
-        f"{D}kernels.py {D}elements.py {D}lanes.py {D}steered_lanes.py {D}loads_in_lanes.py {D}gradient.py {D}tangent.py",
+        f"{D}elements.py",
+        f"{D}kernels.py {D}lanes.py {D}steered_lanes.py {D}loads_in_lanes.py {D}gradient.py {D}tangent.py",
         plain=True,
-        slow=True,
         only=KERNELS,
     ),
-    "solver": Place("continuum/*.py", "tests/continuum/test_*.py"),
-    "archives": Place("discs/files/*.py", f"{D}archive.py {D}files.py {D}untrusted.py {D}restart.py {D}finishing.py"),
+    "solver": Place("continuum/*.py", "tests/continuum/test_*.py", "tests/compare/test_convergence.py"),
+    "archives": Place(
+        "discs/files/*.py",
+        f"{D}archive.py {D}exports.py {D}files.py {D}untrusted.py {D}finishing.py {D}load_files.py",
+        f"{D}restart.py {D}trajectory.py tests/compare/test_sweep_archive.py",
+    ),
     "sweeps": Place(
         "compare/sweeps.py compare/lump.py compare/study.py",
-        "tests/compare/test_sweeps.py tests/compare/test_convergence.py",
-        slow=True,
+        "tests/compare/test_sweeps.py tests/compare/test_convergence.py tests/compare/test_sweep_archive.py",
     ),
-    "loads": Place("discs/loads/*.py", f"{D}loads.py {D}loads_known.py {D}nonlinear.py {D}motors.py {D}signals.py {D}bends.py"),
+    "loads": Place(
+        "discs/loads/*.py",
+        f"{D}loads.py {D}loads_known.py {D}loads_at_limits.py {D}nonlinear.py {D}signals.py {D}bends.py",
+        f"{D}linear.py {D}motors.py {D}kinds_of_loads.py {D}work_by_load.py {D}load_files.py",
+    ),
 }
 
 
@@ -90,30 +106,46 @@ def drawn(place: str, count: int, rng: random.Random) -> list[Mutant]:
     return rng.sample(found, min(count, len(found)))
 
 
-def passes(place: Place, limit: float | None = None, first: str = "") -> bool:
-    """Whether the tests of a place pass; those whose files have the word `first` in their names go first.
+def passes(tests: str, marked: str, place: Place, limit: float | None = None, first: str = "") -> bool:
+    """Whether tests pass; those whose files have the word `first` in their names go first.
 
     limit : seconds, after which they are stopped: subprocess.TimeoutExpired.
     """
     environment = os.environ | ({"NUMBA_DISABLE_JIT": "1"} if place.plain else {}) | {"PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", "-o", "addopts="]
-    command += ["-m", "not long" if place.slow else "not slow and not long", "-k", place.only]
-    files = [str(file) for tests in place.tests.split() for file in sorted(ROOT.glob(tests))]
-    command += sorted(files, key=lambda file: first not in file.rpartition("/")[2])
-    return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=limit, check=False).returncode == 0
+    files = [str(file) for pattern in tests.split() for file in sorted(ROOT.glob(pattern))]
+    command += ["-m", marked, "-k", place.only, *sorted(files, key=lambda file: first not in Path(file).name)]
+    code = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=limit, check=False).returncode
+    return code in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 
 
-def killed(mutant: Mutant, limit: float) -> bool:
-    """Whether the tests notice the mutant. The file is restored, also after Ctrl-C."""
-    source = mutant.file.read_text(encoding="utf-8")
-    try:
-        mutant.file.write_text(applied(source, mutant.change), encoding="utf-8")
-        return not passes(PLACES[mutant.place], limit, mutant.file.stem.partition("_")[0])
-    except subprocess.TimeoutExpired:
-        print(f"more than {limit:.0f} s:", end=" ")
-        return True
-    finally:
-        mutant.file.write_text(source, encoding="utf-8")
+class Trial:
+    """The tests of a place, and how long they take without a mutant."""
+
+    def __init__(self, name: str) -> None:
+        self.place, self.seconds = PLACES[name], [0.0, 0.0]
+        self.tests = (self.place.tests, "not slow and not long"), (f"{self.place.tests} {self.place.more}", "not long")
+
+    def noticed(self, first: str = "") -> bool:
+        """Whether the quick tests fail, or else all of them, or take too long."""
+        for i, (tests, marked) in enumerate(self.tests):
+            begun = time.monotonic()
+            try:
+                if not passes(tests, marked, self.place, 4 * self.seconds[i] + 20 if self.seconds[i] else None, first):
+                    return True
+            except subprocess.TimeoutExpired:
+                return True
+            self.seconds[i] = self.seconds[i] or time.monotonic() - begun
+        return False
+
+    def kills(self, mutant: Mutant) -> bool:
+        """Whether a mutant is noticed. The file is restored, also after Ctrl-C."""
+        source = mutant.file.read_text(encoding="utf-8")
+        try:
+            mutant.file.write_text(applied(source, mutant.change), encoding="utf-8")
+            return self.noticed(mutant.file.stem.partition("_")[0])
+        finally:
+            mutant.file.write_text(source, encoding="utf-8")
 
 
 def main() -> None:
@@ -127,16 +159,15 @@ def main() -> None:
     if subprocess.run(["git", "status", "--porcelain", "*.py"], cwd=ROOT, capture_output=True, text=True, check=True).stdout:
         raise SystemExit("commit or stash first: files are changed in place")
     for name in chosen.only:
-        begun = time.monotonic()
-        if not passes(PLACES[name]):
+        trial = Trial(name)
+        if trial.noticed():
             raise SystemExit(f"the tests of {name} fail without a mutant")
-        limit = 4 * (time.monotonic() - begun) + 20
         mutants = drawn(name, chosen.each, random.Random(f"{name} {chosen.seed}"))
         alive = 0
-        for i, mutant in enumerate(mutants):
-            dead = killed(mutant, limit)
-            alive += not dead
-            print(f"{name} {i + 1} {'killed' if dead else 'SURVIVED'}", mutant.row(), flush=True)
+        for mutant in mutants:
+            if not trial.kills(mutant):
+                alive += 1
+                print(mutant.row(), flush=True)
         print(f"{name}: {len(mutants)} mutants, {len(mutants) - alive} killed", flush=True)
 
 
