@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from discs import simulate
+from discs import State, simulate
 from discs.__main__ import main
 from discs.files import shapes
 from discs.mechanics import textbook
@@ -76,6 +76,8 @@ def test_bodies_for_paraview(run, tmp_path):
         cells = root["CellData/omega"][:].reshape(5, -1)
         np.testing.assert_allclose(cells[:, :6], run.omega, rtol=1e-6)
         np.testing.assert_allclose(cells[:, 7:], run.omega, rtol=1e-6)  # after the rod, which has none
+        force = root["CellData/force"][:].reshape(5, -1)[:, :6]
+        np.testing.assert_allclose(force**2, (run.contact_force**2).sum(axis=1), rtol=1e-5)
         corners = root["Polygons/Connectivity"][:].reshape(6, shapes.CORNERS)
         assert root["Lines/Connectivity"][-7:].tolist() == [*corners[:, 0] - 1, 0]  # the rod, closed
     radius = geometry.drawn_radius(run, None)
@@ -87,11 +89,9 @@ def test_bodies_for_paraview(run, tmp_path):
     np.testing.assert_allclose(((points - points[:, :, :1]) * axle[:, :, None]).sum(axis=-1), 0, atol=1e-6)
 
 
-def test_bodies_for_blender(run, tmp_path):
-    """The animated nodes turn the model's spoke, its z axis, into that of the disc."""
-    trimesh = pytest.importorskip("trimesh")
-    run.save(tmp_path / "run.glb")
-    content = (tmp_path / "run.glb").read_bytes()
+def animated(file):
+    """The animation of a .glb file: what it gives each node, and its times."""
+    content = file.read_bytes()
     size = int.from_bytes(content[12:16], "little")
     tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
 
@@ -104,11 +104,20 @@ def test_bodies_for_blender(run, tmp_path):
         )
 
     (animation,) = tree["animations"]
-    found = {}
+    found, times = {}, []
     for channel in animation["channels"]:
         sampler = animation["samplers"][channel["sampler"]]
-        np.testing.assert_allclose(values(sampler["input"])[:, 0], run.t, rtol=1e-6)
+        times.append(values(sampler["input"])[:, 0])
         found[tree["nodes"][channel["target"]["node"]]["name"], channel["target"]["path"]] = values(sampler["output"])
+    return found, np.array(times)
+
+
+def test_bodies_for_blender(run, tmp_path):
+    """The animated nodes turn the model's spoke, its z axis, into that of the disc."""
+    trimesh = pytest.importorskip("trimesh")
+    run.save(tmp_path / "run.glb")
+    found, times = animated(tmp_path / "run.glb")
+    np.testing.assert_allclose(times, np.broadcast_to(run.t, times.shape), rtol=1e-6)
     assert len([name for name, path in found if name.startswith("link") and path == "scale"]) == 6  # a ring
     for i in range(6):
         places, (x, y, z, w) = found[f"disc {i}", "translation"], found[f"disc {i}", "rotation"].T
@@ -119,6 +128,22 @@ def test_bodies_for_blender(run, tmp_path):
         np.testing.assert_allclose(spoke, expected, atol=1e-5)
     scene = trimesh.load(tmp_path / "run.glb")
     assert set(scene.geometry) == {"disc", "link"}
+
+
+def test_two_discs_that_turn_twice_have_one_link_and_turn_steadily(tmp_path):
+    """Quaternions of q and -q are the same turn: between frames they must not jump, as programs take values between them."""
+    pytest.importorskip("trimesh")
+    problem = uneven(2, Model("springs", "steered"), equal=True)
+    state = State([0.0, 3.1], [0.0, 0.0], [0.3, 0.3], [5.0, 5.0], phi=[0.0, 0.0])
+    simulate(replace(problem, initial=state, duration=3.0), dt=0.05, frames=61, engine="plain", progress=False).save(
+        tmp_path / "run.glb"
+    )
+    found, _ = animated(tmp_path / "run.glb")
+    assert sorted(name for name, path in found if path == "scale") == ["link 0"]
+    np.testing.assert_allclose(found["link 0", "translation"][:, 0], 1.55, atol=1e-6)
+    for disc in ("disc 0", "disc 1"):
+        turns = found[disc, "rotation"]
+        np.testing.assert_allclose((turns[1:] * turns[:-1]).sum(axis=1), np.cos(0.05 * 5.0 / 2), atol=1e-5)
 
 
 def test_without_trimesh(run, tmp_path, monkeypatch):

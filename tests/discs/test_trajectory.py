@@ -108,6 +108,16 @@ def test_discs_of_a_system_of_ones_own():
     assert '"n": 2' in path.view().page
 
 
+def test_two_discs_have_a_line_that_they_follow():
+    """Places without directions, as of discs whose headings follow the line; one disc needs its direction, see below."""
+    system = MechanicalSystem.from_lagrangian(
+        ("x", "y"), np.eye(2), lambda q: 0.0, bodies=lambda q: [q[0] + np.arange(2), q[1] + np.zeros(2), np.zeros(2)]
+    )
+    run = system.integrate([0.0, 0.0], [0.3, 0.4], TIMES, progress=False).discs
+    np.testing.assert_allclose(run.x, np.add.outer(0.3 * TIMES, [0.0, 1.0]), atol=1e-12)
+    assert run.phi is None
+
+
 @pytest.mark.parametrize(
     ("bodies", "shape"), [(lambda q: q[:3], r"\(3,\)"), (lambda q: np.ones((2, 2)), r"\(2, 2\)"), (lambda q: 1.0, r"\(\)")]
 )
