@@ -10,7 +10,8 @@ import pytest
 from compare import convergence, lump
 from compare.load_limits import fitting_twist
 from compare.results import Study, write_studies
-from continuum import Scene, breathing_ring, solve, steered_rod, untwisting_rod
+from compare.study import apart
+from continuum import Scene, breathing_ring, rolling_rod, solve, steered_rod, untwisting_rod
 from discs import Gauss8, simulate
 from discs.loads import Damping, Rest, Slope
 
@@ -116,6 +117,14 @@ def test_rings_need_no_ends(rolling, tmp_path):
     assert (tmp_path / "ring.png").stat().st_size > 10_000
 
 
+def test_a_straight_rod_without_ends_is_compared_up_to_its_shift():
+    """A period further along, x is greater by the length, and all else is the same: 20 discs are near 48, at the seam too."""
+    scene = rolling_rod("unit", duration=0.2, amplitude=0.3, length=3.1)
+    few, many = (simulate(lump(scene, n), dt=0.02, frames=1, engine="plain", progress=False) for n in (20, 48))
+    assert np.abs(many.x[-1] - many.s).max() > 1e-4
+    assert (apart(scene, few, many) < 0.003).all()
+
+
 def test_table_and_csv_hold_the_same(paper_field, tmp_path):
     scene = untwisting_rod()
     studies = [convergence(scene, (9, 17), ends, field=paper_field, progress=False) for ends in ("springs", "consistent")]
@@ -136,10 +145,9 @@ def test_lump():
     assert problem.chain.w.sum() == pytest.approx(4.0)
     with pytest.raises(ValueError, match="at least 3"):
         lump(scene, 2)
-    with pytest.raises(ValueError, match="increasing whole numbers of discs; got"):
-        convergence(scene, (33, 17), progress=False)
-    with pytest.raises(ValueError, match="increasing whole numbers of discs; got"):
-        convergence(scene, (17.5, 33), progress=False)
+    for sizes in ((33, 17), (17.5, 33), ((9, 17),), ()):
+        with pytest.raises(ValueError, match="increasing whole numbers of discs; got"):
+            convergence(scene, sizes, progress=False)
     early = solve(scene, 1e-2, frames=[0.0, 1.0], progress=False)
     for field in (early, solve(scene, method="leapfrog", progress=False)):
         with pytest.raises(ValueError, match=r"field must be solve\(scene, tol\) of this scene up to t = 4.5, with an error"):

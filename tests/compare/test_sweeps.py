@@ -45,10 +45,11 @@ def one_by_one():
 
 
 def test_processes_are_the_default(one_by_one):
+    begun = time.monotonic()
     found = sweep(end_disc, CASES, progress=False)
     assert [r.case for r in found] == CASES
     assert [r.value for r in found] == one_by_one
-    assert all(r.seconds > 0 and not r.error for r in found)
+    assert all(0 < r.seconds < time.monotonic() - begun and not r.error for r in found)
 
 
 def test_a_cluster(one_by_one, tmp_path):

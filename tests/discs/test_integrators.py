@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from discs import Chain, Gauss8, Leapfrog, McLachlanPerlmutter, Midpoint, Problem, State, simulate
+from discs import Chain, Gauss8, Leapfrog, McLachlanPerlmutter, Midpoint, Problem, SimulationError, State, simulate
 from discs.integrators import METHODS, Integrator, Work, find
 from discs.integrators.collocated import Collocated
 from discs.integrators.composition import Composition
@@ -222,6 +222,24 @@ def test_leapfrog_is_the_paper_s_scheme():
     np.testing.assert_allclose(left, right, atol=1e-15)
     np.testing.assert_allclose((x2 - x0)[inner], -radius * (t2 - t0)[inner] * slope(y), atol=1e-15)
     np.testing.assert_allclose((y2 - y0)[inner], radius * (t2 - t0)[inner] * slope(x), atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["leapfrog", "mclachlan-perlmutter", "rk4"])
+def test_explicit_methods_are_stable_up_to_their_limit(name, kernels_as_python):
+    """The shortest wave of a straight rod: (alpha + rho R^2) Omega^2 = beta t + K R^2 t^2, t = 4/k^2. Growth is stopped early."""
+    rod = {"density": 1.3, "spin_inertia": 0.6, "torsion_stiffness": 0.9, "bending_stiffness": 0.8, "radius": 0.7}
+    chain = Chain(n=8, length=3.1, ends="ring", rolling="unit", shift=(3.1, 0.0), **rod)
+    t, theta = 4 / chain.k**2, 1e-9 * (-1.0) ** np.arange(8)
+    fastest = np.sqrt((0.9 * t + 0.8 * (0.7 * t) ** 2) / (0.6 + 1.3 * 0.7**2))
+    dt = METHODS[name].stability_limit / fastest
+    problem, steps = Problem(chain, State(chain.s, 0.7 * theta, theta), 40 * dt), []
+    for engine in ("compiled", "plain"):
+        run = simulate(problem, name, 0.9 * dt, frames=2, progress=False, engine=engine)
+        assert np.abs(run.theta).max() < 4e-9
+        with pytest.raises(SimulationError, match="energy") as failed:
+            simulate(problem, name, 1.05 * dt, frames=2, progress=False, engine=engine)
+        steps.append(failed.value.step)
+    assert steps[0] == steps[1] < 20
 
 
 @pytest.mark.parametrize("name", ["suzuki4", "kahanli6"])
