@@ -33,7 +33,8 @@ class NotReached(SimulationError):
     tol, worst, dt : the tolerance, and the error in units of it with steps dt.
     floor : what rounding makes of it, in the same units; None if it is not the limit.
     best : the run with steps dt. runs : how many were made.
-    held_until : the time from which on no step holds the tolerance (`discs.running.held`); infinite if none is known.
+    held_until : the time from which on no step holds the tolerance (`discs.running.held`), or, where rounding is the limit, the
+        first frame at which it does not; infinite if none is known.
 
     Attributes
     ----------
@@ -44,17 +45,17 @@ class NotReached(SimulationError):
         self, tol: float, worst: float, dt: float, floor: float | None, best: Any, runs: int, held_until: float = np.inf
     ) -> None:
         what = f"tol = {tol:g} was not reached: the error is estimated at {tol * worst:.1e} with dt = {dt:g}"
-        if np.isfinite(held_until):
-            what = f"tol = {tol:g} can be held until about t = {held_until:.3g} only, not until t = {best.t[-1]:g}, with any step"
-            why = (
-                "because a change of the last place of the initial state grows to the tolerance in that time; end the run earlier, "
-            )
-            why += "or take a larger tol, which holds a little longer, or give dt if only energies and averages matter"
-        elif floor is None:
-            why = f"and {runs} runs with smaller and smaller steps were made; take a larger tol or another method"
-        else:
+        if floor is not None:
             why = f"and rounding of positions and sweeps changes a run by {tol * floor:.1e}, so rounding is the limit; "
             why += "take a larger tol, or end the run earlier"
+            why += f", before t = {held_until:.3g}" if held_until < best.t[-1] else ""
+        elif np.isfinite(held_until):
+            what = f"tol = {tol:g} can be held until about t = {held_until:.3g} only, not until t = {best.t[-1]:g}, with any step"
+            why = "because a change of the last place of the initial state grows to the tolerance in that time; "
+            why += "end the run earlier, or take a larger tol, which holds a little longer, or give dt if only energies and "
+            why += "averages matter"
+        else:
+            why = f"and {runs} runs with smaller and smaller steps were made; take a larger tol or another method"
         super().__init__(f"{what}, {why}", best.stats["steps"], best.t[-1], 0)
         self.best, self.held_until, self._given = best, held_until, (tol, worst, dt, floor, best, runs, held_until)
 

@@ -93,6 +93,12 @@ class Looks:
         return np.inf
 
 
+def parted(run: Solution, other: Solution, allowed: Mapping[str, float]) -> float:
+    """The first frame at which two runs differ by more than is allowed; infinite if there is none."""
+    lost = np.flatnonzero(apart(run, other, allowed) >= 1)
+    return float(run.t[lost[0]]) if lost.size else np.inf
+
+
 def apart(run: Solution, other: Solution, allowed: Mapping[str, float]) -> Float:
     """The largest difference of two runs up to each time of the shorter one, in units of what is allowed."""
     count, parts = min(run.t.size, other.t.size), []

@@ -44,7 +44,7 @@ from discs.running import estimates
 from discs.running.by_dop853 import search_explicit
 from discs.running.estimates import LEAST_ORDER
 from discs.running.failure import NotReached, SimulationError
-from discs.running.held import Looks
+from discs.running.held import Looks, parted
 from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
 from discs.solution import Solution
@@ -235,8 +235,9 @@ def search(
         stalls = stalls + 1 if not first and (seen <= LEAST_ORDER or worst >= best_yet) else 0
         best_yet = min(best_yet, worst)
         relative = max(errors[name] / size[name] for name in bound)
+        allowed = {name: tolerance * size[name] for name, tolerance in bound.items()}
         if looks.wanted(relative):
-            until = yield from looks.look({name: tolerance * size[name] for name, tolerance in bound.items()})
+            until = yield from looks.look(allowed)
             if until < end:
                 raise NotReached(least_tol, worst, longer.stats["dt"], None, result(longer, shorter, limit), attempt, until)
         due = not looked and (attempt >= LATE or least_tol < FINE)
@@ -248,7 +249,8 @@ def search(
             if sharp.sweep_tolerance <= estimates.LEAST_SWEPT:  # sweeps that converged to rounding
                 floor = max(floor, estimates.worst(estimates.unswept(found, sharp.sweep_tolerance), bound, size))
             if floor > (1 if resolved else worst / 10):
-                raise NotReached(least_tol, worst, longer.stats["dt"], floor, result(longer, shorter, limit), attempt)
+                until = parted(found, other, allowed)
+                raise NotReached(least_tol, worst, longer.stats["dt"], floor, result(longer, shorter, limit), attempt, until)
         if stalls >= 2 and higher:
             integrator, *higher = higher
             steps, runs, stalls, best_yet = max(FEWEST, steps // 4), [], 0, np.inf
