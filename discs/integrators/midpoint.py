@@ -149,7 +149,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
         do.book_motors(chain, work, now, time + 0.5 * tau, tau, p, move)
         time += tau
         solves += sweep
-        unconverged = max(unconverged, stuck(method, sweep))
+        unconverged = max(unconverged, int(stuck(method, sweep)))
         reach(chain, now, p, move, after)
         now = after
         do.settle(chain, work, now.hi, now.lo)
