@@ -9,8 +9,9 @@ from continuum.free_run import compare, nodes, run
 from continuum.free_start import Data, Given, check
 from continuum.rod import Rod
 from discs import Solution, checks
-from discs.running.frames import check_steps, frame_times
-from discs.running.stats import Stats
+from discs.running.frames import frame_times
+from discs.running.whole_steps import check_steps
+from discs.stats import Stats
 
 MOST_NODES = 1_000_000
 

@@ -36,7 +36,7 @@ from continuum.stepping import TooFast, stages_for, sweeps
 from continuum.wants import arrays, estimated
 from discs import SimulationError, Solution
 from discs.arrays import Float
-from discs.running.stats import Stats
+from discs.stats import Stats
 
 SIZES = (19, 27, 37, 51, 71, 97, 135, 187, 259, 361)  # functions; odd, as a series has one more cosine than sines
 SLOW, MORE = 259, (505, 707, 1001)  # from here on motions are slow, and taken only if the errors fall fast enough

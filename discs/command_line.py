@@ -25,9 +25,9 @@ from discs.problem import Problem
 from discs.running.engine import ENGINES
 from discs.running.failure import SimulationError
 from discs.running.frames import WANTS
-from discs.running.stats import doubts
 from discs.simulation import simulate
 from discs.solution import Solution
+from discs.stats import doubts
 
 OFFERS = sorted({name for method in METHODS.values() for name in method.offers})
 

@@ -20,10 +20,10 @@ from discs.running.moments import Event, checked_events, look_ahead
 from discs.running.once import Asked, run_once
 from discs.running.ready import kernels
 from discs.running.recording import kept_settings
-from discs.running.stats import Stats, of_search
 from discs.running.suggest import suggest_dt
 from discs.running.tolerance import USUAL, answered, search_with_doubt, some_of
 from discs.solution import Solution
+from discs.stats import Stats, of_search
 from discs.warn import warn
 
 
@@ -55,6 +55,11 @@ def simulate(
     want : further quantities to record: "velocity", "slope", "contact_force", "work_by_load" (`run.work_by_load`), and those that
         the method offers (leapfrog: "modified_energy").
     progress : show a progress bar for runs of more than a second.
+    engine : "compiled", which waits until kernels are compiled, once on a machine; "plain" for NumPy and SciPy; "auto", the
+        default: compiled if the kernels are there, otherwise plain while they are compiled in the background, and compiled from the
+        start as soon as they are there; "ready", the same, but nothing is compiled. Both agree up to rounding (with step control to
+        the tolerance). `stats["engine"]` tells which it was and `stats["plain_because"]` why a run is plain. With a checkpoint
+        "auto" is "compiled". The environment variable DISCS_ENGINE names another default.
     tol : tolerance, instead of dt: steps are shortened until the errors of x, y, theta (and phi), relative to the largest value of
         each, are within it. A dictionary, as {"omega": 1e-4}, names the quantities; see `discs.running.tolerance`.
     checkpoint : a file, as "run.nc", to which frames are written as they are computed, in bounded memory. If it exists, its run
@@ -63,11 +68,6 @@ def simulate(
     events : functions of a `discs.events.Moment` that are zero when something happens, own ones or those of `discs.events`;
         `run.events` tells when. One with `terminal = True` ends the run there. They need a method with fixed steps; "auto" is then
         "gauss6". The run is first done step by step to find them, see `discs.running.moments`.
-    engine : "compiled", which waits until kernels are compiled, once on a machine; "plain" for NumPy and SciPy; "auto", the
-        default: compiled if the kernels are there, otherwise plain while they are compiled in the background, and compiled from the
-        start as soon as they are there; "ready", the same, but nothing is compiled. Both agree up to rounding (with step control to
-        the tolerance). `stats["engine"]` tells which it was and `stats["plain_because"]` why a run is plain. With a checkpoint
-        "auto" is "compiled". The environment variable DISCS_ENGINE names another default.
 
     Returns
     -------

@@ -14,7 +14,7 @@ from discs import checks
 from discs.arrays import Float, Int
 from discs.energy_by_kind import energy_by_kind
 from discs.problem import Problem, State
-from discs.running.stats import Stats, doubts
+from discs.stats import Stats, doubts
 
 if TYPE_CHECKING:
     import pandas
@@ -118,7 +118,7 @@ class Solution(Result):
     rolling_residual : (F,), largest |r. - e omega| over the discs, length per time, of the method's own velocities: zero up to
         rounding. (Methods in (q, pi) compute r. as e omega. Their steps roll if |r_{n+1} - r_n - e (theta_{n+1} - theta_n)| = 0
         with e at the midpoint.) None for an extrapolated field.
-    stats : method, order, dt, steps, work, seconds and more; see `discs.running.stats.Stats`.
+    stats : method, order, dt, steps, work, seconds and more; see `discs.stats.Stats`.
     phi, phi_rate : (F, N), own headings, rad, and their rates, rad per time; only of discs that have them.
     x_rate, y_rate : (F, N), velocities of the contact points, length per time; want "velocity".
     slope_x, slope_y : (F, N), headings r', no unit; want "slope".

@@ -22,7 +22,7 @@ FACADES |= {f"discs.chains.links.{law}": ("discs.chains.chain",) for law in ("la
 # The rooms of `discs`, from the ground up. A module imports from its own room and from those before it,
 ROOMS = (
     *("arrays", "warn", "differences", "checks", "skew", "kernels", "chains", "loads", "problem", "energy_by_kind"),
-    *("integrators", "solution", "mechanics", "pictures", "files", "runs", "running", "linkage", "events", "simulation"),
+    *("integrators", "stats", "solution", "mechanics", "pictures", "files", "runs", "running", "linkage", "events", "simulation"),
     *("analysis", "command_line"),
 )
 # but for these arrows up, each with its reason.
@@ -31,10 +31,7 @@ UP = {
     ("kernels", "integrators"): "kernels of gradients follow a method's compiled step, which stands beside the plain one",
     ("chains", "problem"): "`twist` makes the problems of the command line and of examples",
     ("loads", "files"): "`tables` reads files of signals",
-    ("solution", "running"): "`stats`, what every run says of itself",
-    ("mechanics", "running"): "`stats`; sliding discs are a run with frames",
-    ("pictures", "running"): "`stats`",
-    ("files", "running"): "`stats`",
+    ("mechanics", "running"): "sliding discs are a run with frames",
     ("pictures", "files"): "`schema`, the units of quantities",
     ("runs", "running"): "`outcome`, the blocks of many runs",
     ("running", "simulation"): "`simulate_many` runs by `simulate` what does not fit side by side",

@@ -8,7 +8,7 @@ from compare.lab.settings import Settings
 from discs import Problem, Solution
 from discs.arrays import Float
 from discs.integrators import find
-from discs.running.stats import Stats
+from discs.stats import Stats
 
 CHANGED = "sliders or discs were moved during the run: it is not the run of one problem"
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from discs import Problem, Solution, State
 from discs.arrays import Float
-from discs.running.stats import Stats
+from discs.stats import Stats
 
 MOST_NUMBERS = 4_000_000  # of all frames: 32 MB
 MOST_FRAMES = 4000

@@ -27,9 +27,10 @@ from discs.integrators import Integrator, Midpoint, find
 from discs.integrators.collocated import Collocated
 from discs.kernels.background import usual
 from discs.problem import Problem
-from discs.running.frames import check_steps, frame_times, steps_before
+from discs.running.frames import frame_times
 from discs.running.progress import NO_BAR, Progress
 from discs.running.suggest import suggest_dt
+from discs.running.whole_steps import check_steps, steps_before
 from discs.simulation import simulate
 from discs.skew import Phase
 from discs.solution import Solution

@@ -75,7 +75,10 @@ class Branch:
         return np.array([found.state.drift for found in self.modes])
 
     def plot(self, name: str = "parameter") -> "Figure":
-        """A diagram: growth and frequency of the slowest modes over the parameter, filled where the motion is unstable."""
+        """A diagram: growth and frequency of the slowest modes over the parameter, filled where the motion is unstable.
+
+        name : of the parameter, for the axis.
+        """
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(9.0, 4.0), layout="constrained")

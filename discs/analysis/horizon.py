@@ -25,8 +25,8 @@ from discs import checks
 from discs.analysis.tangent import Flow
 from discs.arrays import Float
 from discs.problem import Problem
-from discs.running.frames import check_steps
 from discs.running.suggest import suggest_dt
+from discs.running.whole_steps import check_steps
 
 WAVES = 4  # of each coordinate, the constant among them
 MOST = 1e150  # growth; squares of larger numbers overflow

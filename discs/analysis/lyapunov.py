@@ -25,8 +25,8 @@ from discs import checks
 from discs.analysis.tangent import Flow, units
 from discs.arrays import Float
 from discs.problem import Problem
-from discs.running.frames import check_steps
 from discs.running.suggest import suggest_dt
+from discs.running.whole_steps import check_steps
 
 BLOCKS = 10
 SKIPPED = 0.1  # of the time, in which the vectors turn to their directions

@@ -143,7 +143,10 @@ class Modes:
         return float(self.rate.real.max(initial=-np.inf))
 
     def displaced(self, mode: int, size: float = 1e-3, phase: float = 0.0) -> State | LinkageState:
-        """The state displaced along a mode: by the real part of size e^{i phase} shape, with the rates of that mode."""
+        """The state displaced along a mode: by the real part of size e^{i phase} shape, with the rates of that mode.
+
+        ValueError for a number of a mode that is not there.
+        """
         if checks.whole("mode", mode, 0) >= self.rate.size:
             raise ValueError(f"mode must be below {self.rate.size}, the number of modes; got {mode}")
         return self.state.displaced(size * np.exp(1j * phase) * self.shape[mode], self.rate[mode])

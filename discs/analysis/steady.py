@@ -78,7 +78,7 @@ class Steady:
         return vectors[: shape[0] * shape[1]].T.reshape(-1, *shape)
 
     def displaced(self, change: Complex, rate: complex) -> State:
-        """The state displaced by the real part of `change` (rows, n), with its rates."""
+        """The state displaced by the real part of `change` (rows, n), with the rates of a change that grows as e^{rate t}."""
         lin = self.equations
         values = dict(zip(lin.system.rows, lin.z.hi + change.real, strict=True))
         rates = dict(zip(("omega", "phi_rate"), lin.velocity[2:] + (rate * change[2:]).real, strict=False))
@@ -112,7 +112,12 @@ class Steady:
 
 
 def steady(problem: Problem, at: State | None = None) -> Steady:
-    """The linearised equations about a steady motion; ValueError, with the reason, for a state whose motion is not steady."""
+    """The linearised equations about a steady motion, that of `problem` from the state `at`, by default its initial one.
+
+    Raises
+    ------
+    ValueError : with the reason, for a state whose motion is not steady.
+    """
     lin = linearise(problem, at)
     autonomous(lin, problem.duration)
     drift, turning = _rigid(lin)

@@ -135,6 +135,8 @@ def load(path: str | Path) -> Solution | Trajectory:
     For a run that was interrupted or killed, the solution has the finished frames, and stats["frames_missing"] is the number of the
     others. Arrays of files above 64 MiB are mapped from the file (changes stay in memory).
 
+    path : of a file that `save` or `simulate(..., checkpoint=)` wrote.
+
     Raises
     ------
     ValueError : if the file cannot be read, is not a run, is cut off or damaged, or too large for this machine's memory.

@@ -12,7 +12,7 @@ import numpy as np
 from discs.arrays import Float
 from discs.files import safe, schema, untrusted
 from discs.files.framefile import FrameFile
-from discs.running.stats import Stats
+from discs.stats import Stats
 
 
 def outside(file: FrameFile) -> dict[str, Float]:

@@ -14,7 +14,7 @@ from discs.arrays import Float
 from discs.chains.chain import Chain, SteeredChain
 from discs.loads.tables import load_of, table_of
 from discs.problem import Problem, State
-from discs.running.stats import Stats
+from discs.stats import Stats
 
 FORMAT = "rolling-discs run, version 1"
 UNITS = "any consistent system; units name the quantity, as 'length per time'"

@@ -11,10 +11,11 @@ from discs.arrays import Float
 from discs.linkage.midpoint import Moment, Stepper
 from discs.linkage.problem import LinkageProblem
 from discs.running.failure import SimulationError
-from discs.running.frames import check_steps, frame_times, steps_before
+from discs.running.frames import frame_times
 from discs.running.progress import NO_BAR, Progress
-from discs.running.stats import Stats
+from discs.running.whole_steps import check_steps, steps_before
 from discs.solution import Solution
+from discs.stats import Stats
 
 FEWEST = 50  # steps of the first run of a search
 MOST = 12  # halvings of the step in a search

@@ -9,8 +9,8 @@ import numpy as np
 from discs.arrays import Float
 from discs.mechanics.derivatives import Formula
 from discs.problem import Problem
-from discs.running.stats import Stats
 from discs.solution import Solution
+from discs.stats import Stats
 
 ROWS = (("x", "x_rate"), ("y", "y_rate"), ("theta", "omega"), ("phi", "phi_rate"))
 

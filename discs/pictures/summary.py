@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from discs.mechanics import Trajectory
-from discs.running.stats import doubts
 from discs.solution import Result, Solution
+from discs.stats import doubts
 
 
 def as_html(run: Result) -> str:

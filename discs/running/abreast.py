@@ -18,15 +18,15 @@ from discs.integrators import FixedStep
 from discs.integrators.work import NO_LOOKS
 from discs.kernels.vectors import LANES
 from discs.problem import BLOW_UP, Problem
-from discs.running.album import all_steps_before
 from discs.running.calls import heed_halt
 from discs.running.doubt import ENERGY_DRIFT_WARNING
 from discs.running.frames import ROUNDING
 from discs.running.initial_states import InitialStates
 from discs.running.rounding import LOST_DIGITS_WARNING, lost_digits
-from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, estimated
 from discs.running.time_loop import CHUNK
+from discs.running.whole_steps import all_steps_before
+from discs.stats import Stats
 
 LEAST = {"consistent": 8}  # discs of a chain in a bundle, whose two ends do not overlap then
 FEWEST = 3  # runs that pay side by side

@@ -5,17 +5,10 @@ from typing import Any
 import numpy as np
 
 from discs import checks
-from discs.arrays import Float, Int
+from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.work import Stops
-
-
-def all_steps_before(times: Float, h: float) -> tuple[Int, Float]:
-    """The whole steps before each time, and the time from there, (F,); as `discs.running.frames.steps_before`."""
-    steps = (times / h * (1 + 4e-16) + 1e-9).astype(np.int64)
-    rests: Float = times - steps * h
-    rests[rests <= 1e-9 * h] = 0.0
-    return steps, rests
+from discs.running.whole_steps import all_steps_before
 
 
 class Album:

@@ -5,9 +5,9 @@ import numpy as np
 from discs.arrays import Float
 from discs.integrators import METHODS
 from discs.problem import BLOW_UP, Problem
-from discs.running.frames import steps_before
-from discs.running.stats import STEP_ERROR_WARNING, Stats, doubts
+from discs.running.whole_steps import steps_before
 from discs.solution import Solution
+from discs.stats import STEP_ERROR_WARNING, Stats, doubts
 
 ENERGY_DRIFT_WARNING = 0.01  # relative
 AIM = 1e-3  # relative error for which a warning suggests a step

@@ -13,21 +13,7 @@ from discs.loads.motor import Held
 from discs.running.time_loop import March
 
 WANTS = ("velocity", "slope", "contact_force", "work_by_load")
-MOST_STEPS = 2.0**53
 ROUNDING = 1e-12  # relative to the duration: a time beyond the end by less counts as the end
-
-
-def check_steps(end: float, h: float) -> None:
-    """ValueError if there are more steps of length h to a time than can be counted."""
-    if end / h > MOST_STEPS:
-        raise ValueError(f"dt = {h:g} makes {end / h:.1g} steps to t = {end:g}, more than can be counted: take a larger dt")
-
-
-def steps_before(time: float, h: float) -> tuple[int, float]:
-    """The number of whole steps before a time, and the remaining time; a time within rounding of a step counts as the step."""
-    steps = int(time / h * (1 + 4e-16) + 1e-9)
-    rest = time - steps * h
-    return steps, rest if rest > 1e-9 * h else 0.0
 
 
 def frame_times(frames: int | ArrayLike, duration: float) -> Float:

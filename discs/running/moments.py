@@ -20,10 +20,11 @@ from discs.integrators.work import Frame
 from discs.kernels.background import usual
 from discs.problem import Problem, State
 from discs.running.engine import plain_because, refuse_loads
-from discs.running.frames import ROUNDING, asked, check_steps, steps_before
+from discs.running.frames import ROUNDING, asked
 from discs.running.ready import kernels
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
+from discs.running.whole_steps import check_steps, steps_before
 from discs.solution import Occurrence
 from discs.warn import kept, warn
 

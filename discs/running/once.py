@@ -16,15 +16,16 @@ from discs.integrators.work import Cut
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.engine import WAITING, Overtaken, plain_because, refuse_loads
-from discs.running.frames import MOST_STEPS, ROUNDING, check_steps, frame_times, observed, steps_before, wanted
+from discs.running.frames import ROUNDING, frame_times, observed, wanted
 from discs.running.progress import NO_BAR, Progress
 from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows
-from discs.running.stats import Stats, begun
 from discs.running.step_error import Watch
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
+from discs.running.whole_steps import MOST_STEPS, check_steps, steps_before
 from discs.solution import Solution
+from discs.stats import Stats, begun
 
 Result = TypeVar("Result")
 Given = ParamSpec("Given")

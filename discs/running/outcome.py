@@ -7,8 +7,8 @@ import numpy as np
 from discs.arrays import Float
 from discs.files.archive import recorded
 from discs.running.failure import SimulationError
-from discs.running.stats import Stats
 from discs.solution import Solution
+from discs.stats import Stats
 
 
 class Block(NamedTuple):

@@ -13,9 +13,9 @@ from discs.running.abreast import FEWEST, kind_of, side_by_side
 from discs.running.frames import frame_times
 from discs.running.outcome import Block, Outcome, add, fail
 from discs.running.searches import search_abreast
-from discs.running.stats import Stats, begun
 from discs.running.suggest import suggest_dt
 from discs.simulation import simulate
+from discs.stats import Stats, begun
 from discs.warn import kept
 
 MOST = 8  # runs in a part, one by one

@@ -24,9 +24,9 @@ from discs.files.framefile import FrameFile, room
 from discs.files.restart import FROM_THE_BEGINNING, Restart
 from discs.integrators import Integrator, from_settings
 from discs.problem import Problem
-from discs.running.stats import Stats, of_search
 from discs.running.time_loop import March
 from discs.solution import Solution
+from discs.stats import Stats, of_search
 from discs.warn import warn
 
 SECONDS = 1.0  # between two restart files, or twenty times the time of writing one if that is more

@@ -14,9 +14,9 @@ from discs.running.doubt import doubted
 from discs.running.failure import SimulationError
 from discs.running.once import run_fixed
 from discs.running.outcome import Outcome, add, fail
-from discs.running.stats import begun
 from discs.running.tolerance import Request, search_with_doubt
 from discs.solution import Solution
+from discs.stats import begun
 from discs.warn import kept
 
 

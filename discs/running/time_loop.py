@@ -14,9 +14,9 @@ from discs.running.album import Album
 from discs.running.calls import heed_halt
 from discs.running.failure import SimulationError, blown_up, lost_heading
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
-from discs.running.stats import Stats
 from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
+from discs.stats import Stats
 from discs.warn import warn
 
 WATCHED = ("looks", "passed", "doubted", "defects", "places")  # attributes of a `Watch` that a restart needs

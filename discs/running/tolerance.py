@@ -45,9 +45,9 @@ from discs.running.by_dop853 import search_explicit
 from discs.running.estimates import LEAST_ORDER
 from discs.running.failure import NotReached, SimulationError
 from discs.running.held import Looks, parted
-from discs.running.stats import Stats
 from discs.running.suggest import suggest_dt
 from discs.solution import Solution
+from discs.stats import Stats
 
 USUAL = 1e-3  # the default tolerance
 LEAST = 1e-12  # the least tolerance: some thousand times the rounding of a position

@@ -5,7 +5,7 @@ import pytest
 
 from discs import suggest_dt
 from discs.chains.twist import PAPER, untwisting_chain
-from discs.running.frames import steps_before
+from discs.running.whole_steps import steps_before
 
 
 def test_an_implicit_step_is_half_the_time_of_a_torsion_wave_from_disc_to_disc():
