@@ -25,6 +25,8 @@ from discs import (
 )
 from discs.analysis import gradient, growth, horizon, lyapunov
 from discs.events import FrictionExceeded, Line, Touch
+from discs.files.results import Archive, read, record
+from discs.running.outcome import from_data
 from tests.fuzz.__main__ import FAULT, answers
 from tests.fuzz.doors import ROD, N, S, parked, run, slaved, still, trailer, with_event, with_load
 
@@ -204,3 +206,48 @@ def test_the_lab_refuses_numbers_beyond_doubles():
         reply.content for reply in lab.handle({"kind": "advance", "time": 10**400}) if reply.content["kind"] == "refused"
     )
     assert "time must be a number from 0 to 1; got a whole number of 401 digits" in str(refused)
+
+
+def kept(path):
+    """An ensemble with a checkpoint, its frames as bytes."""
+    found = simulate_many([slaved(), still()], dt=0.1, engine="plain", progress=False, threads=1, checkpoint=path)
+    return found.x.tobytes() + found.theta.tobytes()
+
+
+def test_a_changed_digit_of_a_checkpoint_is_noticed(tmp_path):
+    """A changed digit was another result, without a word."""
+    path = tmp_path / "runs.jsonl"
+    whole, content = kept(path), path.read_bytes()
+    place = content.index(b'"theta"') + 20
+    other = b"1" if content[place : place + 1] == b"0" else b"0"
+    path.write_bytes(content[:place] + other + content[place + 1 :])
+    with pytest.raises(ValueError, match="is damaged: line 2 is not what was written; delete that line, and its case"):
+        kept(path)
+    path.write_bytes(content.splitlines(keepends=True)[0])
+    assert kept(path) == whole
+
+
+def test_a_changed_digit_of_a_sweep_is_noticed(tmp_path):
+    path = tmp_path / "sweep.jsonl"
+    with Archive(path, "f", "") as archive:
+        archive.write(record(1.0, 0.123))
+    path.write_bytes(path.read_bytes().replace(b"0.123", b"0.124"))
+    with pytest.raises(ValueError, match="damaged: line 2 is not what was written"):
+        read(path)
+
+
+def test_archives_of_sweeps_without_sums_are_read(tmp_path):
+    """Those of version 0.1."""
+    path = tmp_path / "sweep.jsonl"
+    line = '{"case": 1.0, "value": 0.123, "error": "", "trace": "", "seconds": 0.0}'
+    path.write_text(f'{{"function": "f", "content": ""}}\n{line}\n', encoding="utf-8")
+    assert read(path)[0].value == 0.123
+    with Archive(path, "f", "") as archive:
+        archive.write(record(2.0, 0.5))
+    assert [found.value for found in read(path)] == [0.123, 0.5]
+
+
+@pytest.mark.parametrize("data", [None, 3, {}, {"blocks": [], "failed": [], "warned": []}, {"blocks": [{"runs": [0]}]}])
+def test_a_forged_checkpoint_is_refused(data):
+    with pytest.raises(ValueError, match="must be one that simulate_many has written; what it has of some runs is not"):
+        from_data(data, [0, 1])

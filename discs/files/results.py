@@ -1,8 +1,14 @@
 """Archives of results, of `compare.sweep` and `discs.simulate_many`: a line of JSON that identifies what was computed, and a line
-for each result."""
+for each result.
+
+The last entry of a line, `sum`, is the CRC-32 of the line without it. A line that was changed since is refused: a digit that
+changed would be another result. Archives of version 0.1 have no sums.
+"""
 
 import json
 import os
+import re
+import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,6 +42,30 @@ def record(case: Any, value: Any = None, error: str = "", trace: str = "", secon
     return json.dumps(Result(case, value, error, trace, seconds)._asdict(), default=_plain)
 
 
+SUM = re.compile(rb', "sum": "([0-9a-f]{8})"}\Z')
+
+
+def _summed(line: str) -> bytes:
+    """A line of JSON, an object, with its checksum."""
+    content = line.encode()
+    return content[:-1] + f', "sum": "{zlib.crc32(content):08x}"}}'.encode()
+
+
+def _checked(line: bytes, needed: bool) -> dict[str, Any]:
+    """The object in a line, without its checksum; ValueError if that is not right, or missing where it is needed."""
+    found = SUM.search(line)
+    if found:
+        line = line[: found.start()] + b"}"
+    if zlib.crc32(line) != int(found[1], 16) if found else needed:
+        raise Damaged
+    content: dict[str, Any] = json.loads(line)
+    return content
+
+
+class Damaged(ValueError):
+    """A line is not what was written."""
+
+
 def read(archive: str | Path) -> list[Result]:
     """The results in an archive, the last for each case; none if there is no file. An incomplete last line is left out.
 
@@ -52,11 +82,19 @@ def _parsed(path: str | Path, content: bytes, name: str = "archive", by: str = "
     """The first line of an archive, its results, and the number of its bytes that are complete lines."""
     whole = content.rfind(b"\n") + 1
     try:
-        first, *lines = content[:whole].decode().split("\n")[:-1]
+        first, *lines = content[:whole].split(b"\n")[:-1]
         of = json.loads(first)
-        if not isinstance(of, dict) or not of.keys() <= {"function", "content"} or not isinstance(of["function"], str):
+        if not isinstance(of, dict) or not of.keys() <= {"function", "content", "sums"} or not isinstance(of["function"], str):
             raise ValueError
-        found = {key_of(result.case): result for result in (Result(**json.loads(line)) for line in lines)}
+        found, summed, number = {}, bool(of.pop("sums", False)), 1
+        for line in lines:
+            number += 1
+            result = Result(**_checked(line, summed))
+            found[key_of(result.case)] = result
+    except Damaged:
+        raise ValueError(
+            f"{name} {path} is damaged: line {number} is not what was written; delete that line, and its case is computed again"
+        ) from None
     except (ValueError, KeyError, TypeError, RecursionError):
         raise ValueError(f"{name} must be a file that a {by} has written, or a new one; {path} is neither") from None
     return of, list(found.values()), whole
@@ -98,7 +136,7 @@ class Archive:
             if not os.path.lexists(self._path) or not self._path.stat().st_size:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 with safe.fresh(self._path) as new:  # the first line is written completely or not at all
-                    new.write(f"{json.dumps(self._of)}\n".encode())
+                    new.write(f"{json.dumps(self._of | {'sums': True})}\n".encode())
             self._fd = safe.opened(self._path, os.O_RDWR)
         except (OSError, ValueError) as error:
             raise ValueError(f"{self._name} must be a file that can be written; {self._path} is not: {error}") from None
@@ -127,7 +165,7 @@ class Archive:
     def write(self, line: str) -> None:
         """Append a line."""
         if self._path:
-            safe.write_all(self._fd, f"{line}\n".encode())
+            safe.write_all(self._fd, _summed(line) + b"\n")
             os.fsync(self._fd)
 
     def __exit__(self, *error: object) -> None:

@@ -114,10 +114,9 @@ def _run(
     shown = Progress("runs", len(problems), "run") if progress else None
     with Archive(checkpoint, "discs.simulate_many", told, *words) as kept, shown or NO_BAR:
         for found in kept.found:
-            number, *part = found.case
-            if number in rest and [*rest[number]] == part:
-                done[number] = from_data(found.value)
-                del rest[number]
+            number = next((k for k, part in rest.items() if [k, *part] == found.case), None)
+            if number is not None:
+                done[number] = from_data(found.value, rest.pop(number).numbers)
         count = len(problems) - sum(len(part.numbers) for part in rest.values())
 
         def took(number: int, future: Future[Outcome]) -> None:

@@ -1,5 +1,6 @@
 """The outcome of some of many runs (`discs.running.ensemble`), and its form as data."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,8 +56,25 @@ def as_data(outcome: Outcome) -> dict[str, Any]:
     return {"blocks": blocks, "failed": failed, "warned": list(outcome.warned.items())}
 
 
-def from_data(data: dict[str, Any]) -> Outcome:
-    """The outcome that `as_data` stored."""
+def from_data(data: Any, numbers: Sequence[int]) -> Outcome:
+    """The outcome that `as_data` stored, of runs with these numbers; ValueError if it is something else."""
+    try:
+        outcome = _from_data(data)
+        whole = all(
+            len(block.runs) == len(block.stats) == len(block.estimates)
+            and all(value.shape[:2] == (len(block.runs), block.t.size) for value in block.rows.values())
+            for block in outcome.blocks
+        )
+        runs = [number for block in outcome.blocks for number in block.runs]
+        whole = whole and sorted([*runs, *outcome.failed]) == sorted(numbers)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+        whole = False
+    if not whole:
+        raise ValueError("the file of a checkpoint must be one that simulate_many has written; what it has of some runs is not")
+    return outcome
+
+
+def _from_data(data: Any) -> Outcome:
     blocks = [
         Block(**block | {"t": _array(block["t"]), "rows": {name: _array(value) for name, value in block["rows"].items()}})
         for block in data["blocks"]

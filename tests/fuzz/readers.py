@@ -1,10 +1,12 @@
-"""Coverage-guided fuzzing of everything that reads a file: scenes in TOML, archives and what `info` says of them, restart files.
+"""Coverage-guided fuzzing of everything that reads a file: scenes in TOML, archives and what `info` says of them, restart files,
+archives of sweeps and checkpoints of ensembles.
 
     pip install atheris
     python tests/fuzz/readers.py -max_total_time=600 -timeout=20 -rss_limit_mb=3000 -len_control=0 -max_len=65536 corpus/
 
 Not part of the tests. A reader may raise ValueError and nothing else; an archive that was changed is refused or is the same run.
-The first byte of an input chooses what it is: a TOML file, bytes of an archive, changes to a whole archive, or to a restart file.
+The first byte of an input chooses what it is: a TOML file, bytes of an archive, changes to a whole archive, to a restart file, to
+the archive of a sweep, or to the checkpoint of an ensemble.
 """
 
 import sys
@@ -16,10 +18,11 @@ import atheris
 
 with atheris.instrument_imports(include=["discs", "continuum", "tomllib"]):
     from continuum.files import read_scene
-    from discs import Solution, load, simulate
+    from discs import Solution, load, simulate, simulate_many
     from discs.chains.twist import untwisting_chain
     from discs.command_line import about
     from discs.files.restart import read_restart
+    from discs.files.results import Archive, read, record
     from discs.running import recording
 
 FOLDER = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
@@ -47,6 +50,26 @@ def seeds() -> tuple[Solution, bytes, bytes]:
 
 
 RUN, WHOLE, RESTART = seeds()
+CASES = {str(case): {"y": case / 7, "name": "disc"} for case in range(3)}
+
+
+def many(checkpoint: Path) -> bytes:
+    """The frames of some runs, from a checkpoint or computed."""
+    problems = [untwisting_chain(n, duration=0.1) for n in (4, 5, 6)]
+    runs = simulate_many(problems, "rk4", dt=0.05, engine="plain", progress=False, checkpoint=checkpoint, threads=1)
+    return b"".join(run.x.tobytes() + run.omega.tobytes() for run in runs)
+
+
+def results() -> tuple[bytes, bytes, bytes]:
+    """The archive of a sweep, the checkpoint of an ensemble, and the frames of its runs."""
+    with Archive(FOLDER / "sweep.jsonl", "function", "content") as archive:
+        for case, value in CASES.items():
+            archive.write(record(case, value))
+    frames = many(FOLDER / "many.jsonl")
+    return (FOLDER / "sweep.jsonl").read_bytes(), (FOLDER / "many.jsonl").read_bytes(), frames
+
+
+SWEEP, MANY, FRAMES = results()
 TOML = b'scene = "steered_rod"\nduration = 0.5\nshear_stiffness = 6.0\nradius = 0.7\n'
 
 
@@ -63,7 +86,7 @@ def changed(data: atheris.FuzzedDataProvider, whole: bytes) -> bytes:
 def one_input(content: bytes) -> None:
     """Read one file."""
     data = atheris.FuzzedDataProvider(content)
-    kind, path = data.ConsumeIntInRange(0, 3), FOLDER / "input"
+    kind, path = data.ConsumeIntInRange(0, 5), FOLDER / "input"
     try:
         if kind == 0:
             path.write_bytes(data.ConsumeBytes(4096))
@@ -72,6 +95,12 @@ def one_input(content: bytes) -> None:
         elif kind == 3:
             path.write_bytes(changed(data, RESTART))
             read_restart(path)
+        elif kind == 4:
+            path.write_bytes(changed(data, SWEEP))
+            assert all(result.value == CASES[result.case] and not result.error for result in read(path))
+        elif kind == 5:
+            path.write_bytes(changed(data, MANY))
+            assert many(path) == FRAMES
         else:
             path.write_bytes(data.ConsumeBytes(1 << 16) if kind == 1 else changed(data, WHOLE))
             found = load(path)
@@ -93,6 +122,8 @@ def main() -> None:
             ("archive", WHOLE + b"\x01"),
             ("changes", b"\x01\x02"),
             ("restart", b"\x01\x03"),
+            ("sweep", b"\x01\x04"),
+            ("many", b"\x01\x05"),
         ):
             (Path(folder) / name).write_bytes(content)
     atheris.Setup(sys.argv, one_input)
