@@ -125,6 +125,15 @@ def test_a_straight_rod_without_ends_is_compared_up_to_its_shift():
     assert (apart(scene, few, many) < 0.003).all()
 
 
+@pytest.mark.parametrize("progress", [False, True])
+def test_a_study_of_own_headings_says_so_and_shows_a_bar_if_it_is_asked_to(monkeypatch, progress):
+    bars = []
+    monkeypatch.setattr("compare.study.tqdm", lambda chains, disable, **_: bars.append(disable) or chains)
+    study = convergence(steered_rod(duration=0.2), (5, 9), tol=1e-2, dt=0.02, progress=progress)
+    assert study.ends == "own"
+    assert bars == [not progress]
+
+
 def test_table_and_csv_hold_the_same(paper_field, tmp_path):
     scene = untwisting_rod()
     studies = [convergence(scene, (9, 17), ends, field=paper_field, progress=False) for ends in ("springs", "consistent")]

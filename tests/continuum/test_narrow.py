@@ -92,3 +92,9 @@ def test_a_density_follows_the_data():
         scene(closed=True, theta=bump(0.02)),
     ):
         assert Density.of(resolve(plain)).centres == ()
+
+
+def test_the_derivatives_of_a_density_are_those_of_its_coordinate():
+    density, s, h = Density(2.3, ((0.7, 0.2, 3.0), (1.6, 0.4, 1.2))), np.linspace(0.1, 2.2, 22), 1e-4
+    for integral, derivative in ((density.coordinate, density.rate), (density.rate, density.change)):
+        np.testing.assert_allclose((integral(s + h) - integral(s - h)) / (2 * h), derivative(s), atol=1e-4)
