@@ -44,7 +44,7 @@ PLACES = {
     "mechanics": Place(
         "discs/mechanics/*.py discs/skew.py",
         f"{D}mechanics.py {D}system.py {D}textbook.py {D}momentum.py {D}friction.py {D}sliding.py {D}contact.py",
-        f"{D}vakonomic.py {D}driven.py {D}trajectory.py tests/compare/test_quantities.py",
+        f"{D}motion.py {D}vakonomic.py {D}driven.py {D}trajectory.py tests/compare/test_quantities.py",
     ),
     "chains": Place(
         "discs/chains/*.py discs/chains/rolling/*.py discs/chains/links/*.py",
