@@ -14,6 +14,15 @@ from discs.arrays import Float
 RATES = {"omega": 2, "phi_rate": 3}  # and their rows of C
 
 
+def _like(name: str, given: Any, shape: tuple[int, ...]) -> Float:
+    """Derivatives as an array of a shape; ValueError for other shapes, and for values that are not finite."""
+    found = checks.array(name, given)
+    fits = len(found.shape) <= len(shape) and all(a in (1, b) for a, b in zip(found.shape[::-1], shape[::-1], strict=False))
+    if fits and np.isfinite(found).all():
+        return np.broadcast_to(found, shape)
+    raise ValueError(f"{name} must be finite numbers of shape {shape}; got {checks.shown(given)}")
+
+
 def cost_by_frame(
     times: Float,
     values: dict[str, Float],
@@ -22,10 +31,10 @@ def cost_by_frame(
 ) -> list[dict[str, Float]]:
     """The derivatives of the cost by the quantities of each frame, whose values at `times` (F,) are (F, n)."""
     if cost_gradient is not None:
-        given = cost_gradient(SimpleNamespace(t=times, **values))
+        given = checks.called("cost_gradient", cost_gradient, SimpleNamespace(t=times, **values))
         if not isinstance(given, dict) or not given.keys() <= values.keys():
             raise ValueError(f"cost_gradient must return arrays by names among {', '.join(values)}; got {checks.shown(given)}")
-        made = {name: np.broadcast_to(np.asarray(each, float), values[name].shape) for name, each in given.items()}
+        made = {name: _like(f"{name} of cost_gradient", each, values[name].shape) for name, each in given.items()}
         return [{name: each[i] for name, each in made.items()} for i in range(times.size)]
     total = len(values) * next(iter(values.values())).size
     whole = scipy.sparse.eye_array(total, format="csr")

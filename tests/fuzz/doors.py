@@ -380,7 +380,7 @@ def doors() -> Iterator[Door]:
         weight=2,
     )
     yield Door("growth", growth, lambda: {"problem": slaved(), "dt": 0.1, "method": "gauss4", "most": 1e150})
-    yield Door("horizon", horizon, lambda: {"problem": slaved(), "tolerance": 1e-3, "dt": 0.1, "method": "gauss4"})
+    yield Door("horizon", horizon, lambda: {"problem": slaved(), "error": 1e-3, "dt": 0.1, "method": "gauss4", "tolerance": 1.0})
     yield Door(
         "gradient",
         lambda **a: gradient(**a, **quiet()),
