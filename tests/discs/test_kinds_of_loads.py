@@ -189,6 +189,14 @@ def test_work_is_that_at_the_last_stages(kernels_as_python):
     assert abs(run.energy - run.energy[0] - run.work + run.dissipated).max() < 1e-13 * abs(run.energy).max()
 
 
+def test_explicit_steps_take_signals_at_their_stages(kernels_as_python):
+    problem = replace(uneven(7, KINDS[0]), loads=(Torque(2.0, signals.sine(1.0, 6.0)),))
+    exact = simulate(problem, "gauss6", 0.01, [0.0, 0.2], progress=False, engine="plain")
+    for engine in ("compiled", "plain"):
+        run = simulate(problem, "rk4", 0.005, [0.0, 0.2], progress=False, engine=engine)
+        np.testing.assert_allclose(run.theta, exact.theta, rtol=0, atol=1e-7)
+
+
 @models([KINDS[0], KINDS[2]])
 @pytest.mark.parametrize("method", ["leapfrog", "mclachlan-perlmutter"])
 def test_explicit_schemes_take_loads_that_are_part_of_the_energy(model, method, kernels_as_python):

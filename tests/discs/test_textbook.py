@@ -165,3 +165,10 @@ def test_bad_parameters_are_refused():
         oscillators.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, **START, drift=0.1)
     with pytest.raises(ValueError, match="q must be 3 finite numbers"):
         oscillators.driven_oscillator(**OSCILLATOR, wave=0.5, skew=0.6, q=(1, 2), speed=1.0, drift=3.0)
+
+
+def test_one_frame_is_enough_before_the_start_or_at_it():
+    book = textbook.rolling_disc(1.3, 0.6, 0.4, 0.7, roll_rate=1.1, turn_rate=0.8)
+    for times in ([0.0], [0.7], [-0.7, 0.0]):
+        path = book.integrate(times, 1e-9, progress=False)
+        np.testing.assert_allclose(path.q, [book.exact(t)[0] for t in times], atol=1e-7)
