@@ -10,6 +10,7 @@ from compare.lab.settings import Settings
 from discs import (
     Chain,
     LinkageProblem,
+    LinkageState,
     MechanicalSystem,
     Problem,
     State,
@@ -17,6 +18,7 @@ from discs import (
     first_slip,
     friction_needed,
     lagrange_dalembert,
+    load,
     loads,
     simulate,
     simulate_many,
@@ -49,6 +51,10 @@ def of(**given):
 
 def linkage(**given):
     return simulate(LinkageProblem(trailer(), parked(), 0.1), **{"dt": 0.05, "progress": False} | given)
+
+
+def linkage_of(state):
+    return LinkageProblem(trailer(), state, 0.1)
 
 
 def from_lagrangian(**given):
@@ -96,6 +102,9 @@ def test_odd_arguments():
         (lambda: of(wrt=np.ones((2, 2))), "wrt must be names among"),
         (lambda: of(cost=3.0), "cost must be a function of a run; got 3.0"),
         (lambda: of(cost_gradient=3.0), "cost_gradient must be a function of a run; got 3.0"),
+        (lambda: of(cost=lambda run: 1 / 0), "the cost raised ZeroDivisionError"),
+        (lambda: load(b"run.nc"), "path must be the path of a file, a text or a Path; got b'run.nc'"),
+        (lambda: linkage_of(LinkageState(0.5 * np.arange(4), 0.0, np.pi / 2, x_rate=1e200)), "the initial energy is too large"),
         (lambda: of(cost_gradient=lambda: 3.0), "cost_gradient raised TypeError"),
         (lambda: of(cost_gradient=lambda run: {"y": np.ones(9)}), r"y of cost_gradient must be finite numbers of shape \(1, 6\)"),
         (lambda: of(cost_gradient=lambda run: {"y": np.nan * run.y}), r"y of cost_gradient must be finite numbers of shape"),

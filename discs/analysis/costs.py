@@ -44,6 +44,8 @@ def cost_by_frame(
         found = cost(SimpleNamespace(t=times, **duals))
     except AttributeError as error:
         raise ValueError(f"a cost may use t, {', '.join(values)} of the run; it said: {error}") from None
+    except ArithmeticError as error:
+        raise ValueError(f"the cost raised {type(error).__name__}: {error}") from error
     except TypeError as error:
         raise ValueError(f"the cost cannot be differentiated: {error}") from None
     if not isinstance(found, Dual) or found.size != 1:

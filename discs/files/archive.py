@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from discs import checks
 from discs.arrays import Float
 from discs.files import safe
 from discs.files.framefile import FrameFile, room
@@ -141,5 +142,5 @@ def load(path: str | Path) -> Solution | Trajectory:
     ------
     ValueError : if the file cannot be read, is not a run, is cut off or damaged, or too large for this machine's memory.
     """
-    with FrameFile.open(path) as file:
+    with FrameFile.open(checks.path("path", path)) as file:
         return file.trajectory() if "q" in file else file.solution()

@@ -42,7 +42,10 @@ class LinkageProblem:
         object.__setattr__(self, "duration", checks.number("duration", self.duration, positive=True))
         if np.size(self.initial.x) != self.linkage.n:
             raise ValueError(f"initial state must have the linkage's {self.linkage.n} nodes; got {np.size(self.initial.x)}")
-        starting.check(self.equations, *self.start())
+        with np.errstate(all="ignore"):  # what overflows is refused
+            starting.check(self.equations, *self.start())
+            if not np.isfinite(self.energy()):
+                raise ValueError("the initial energy is too large for a double: change units, or the places, rates and parameters")
 
     @cached_property
     def equations(self) -> Equations:
