@@ -22,7 +22,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from discs.kernels.compiled import NotReady, readily, uncached
+from discs.kernels.cache import uncached
+from discs.kernels.compiled import NotReady, readily
 
 ENGINE = "DISCS_ENGINE"  # in the environment: the engine of runs that are given none
 ASIDE = "DISCS_COMPILE_ASIDE"  # in the environment, so that worker processes inherit it; see `compiling_aside`

@@ -4,39 +4,28 @@
 Parts are plain Python functions. numba is imported, and parts are registered with it, when the first kernel is compiled. With
 NUMBA_DISABLE_JIT=1 all run as plain Python, for debuggers and to measure coverage.
 
-Compiled kernels are cached on disc, so each is compiled once per machine. numba identifies a cached kernel by its own file, not by
-the files it calls. So each pair of a method and a chain has its own folder, named by the content of the files that the kernel may
-call: those with its forms, and those of the parts and forms that they import. The folder is in NUMBA_CACHE_DIR if that is set,
-otherwise in `__pycache__` beside the kernels, otherwise in the user's cache. If none can be written, every process compiles, with
-a warning. A new folder replaces folders of earlier content that no process has used for a day.
+Compiled kernels are cached on disc (`discs.kernels.cache`), so each is compiled once per machine. numba identifies a cached kernel
+by its own file, not by the files it calls. So each pair of a method and a chain has its own folder, named by the content of the
+files that the kernel may call: those with its forms, and those of the parts and forms that they import.
 """
 
-import hashlib
 import inspect
-import os
-import shutil
 import sys
-import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
-from functools import cache, partial, singledispatch, wraps
+from functools import partial, singledispatch, wraps
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from discs.kernels import cache
 from discs.kernels.lean import lean
-from discs.warn import warn
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # Parts of a kernel count no references, as the kernel holds their arguments and they make no arrays. Python cannot call them.
 PART: dict[str, Any] = OPTIONS | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-HERE = Path(__file__).parent
-CALLED = HERE / "compiled.py", HERE / "interrupts.py", HERE / "limits.py"  # files that every kernel depends on
-ROOM = 2**20  # bytes on disc that a kernel may need
-UNUSED = 86_400.0  # seconds without use after which kernels of earlier content are removed
 CUT = -1, 0, 0  # the cost of a step that Ctrl-C interrupted
 Cost = tuple[int, int, int]  # of a step: gradients, solves, unconverged iterations
 
@@ -155,15 +144,12 @@ def _refusing() -> Iterator[None]:
 
 def _surely_missing(function: Callable[..., Any], *kinds: type) -> bool:
     """Whether a kernel is not in the cache, as far as can be told without importing numba, which takes a second."""
-    base = Path(os.environ.get("NUMBA_CACHE_DIR") or HERE / "__pycache__")
-    if (
-        "numba" in sys.modules
-        or Path(".numba_config.yaml").exists()
-        or not os.access(base if base.exists() else base.parent, os.W_OK)
-    ):
-        return False
-    name, files = "-".join([function.__name__, *(kind.__name__ for kind in kinds)]), _files(function, *kinds)
-    return not any((base / f"kernels-{name}-{_content(files)}").rglob("*.nbi"))
+    return "numba" not in sys.modules and cache.there(_files(function, *kinds), _name(function, *kinds)) is False
+
+
+def _name(function: Callable[..., Any], *kinds: type) -> str:
+    """The name of a kernel for these types of parameters."""
+    return "-".join([function.__name__, *(kind.__name__ for kind in kinds)])
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -213,9 +199,9 @@ def compiled(function: Callable[..., Any], *kinds: type) -> Callable[..., Any]:
     files = _files(function, *kinds)
     if not all(path.is_file() for path in files):  # code in a notebook is not cached
         return jit(function)
-    kept = _cache(files, "-".join([function.__name__, *(kind.__name__ for kind in kinds)]))
+    kept = cache.folder(files, _name(function, *kinds))
     if not kept:
-        _warn_of_no_cache()
+        cache.warn_of_no_cache()
         return jit(function)
     own, numba.config.CACHE_DIR = numba.config.CACHE_DIR, kept
     try:
@@ -237,58 +223,6 @@ def _files(function: Callable[..., Any], *kinds: type) -> tuple[Path, ...]:
         names |= {form for stub, form in forms if stub in found}  # not those of stubs that other kernels call
         waiting = (names & _MODULES.keys()) - found
     return tuple(sorted(Path(_MODULES[name].get("__file__", name)) for name in found))
-
-
-def _content(files: tuple[Path, ...]) -> str:
-    """A hash of these files, and of the whole folder of those in other packages: it identifies the kernels that call them."""
-    folders = {path.parent for path in files if HERE.parent not in path.parents and (path.parent / "__init__.py").exists()}
-    sources = sorted({*files, *CALLED, *(source for folder in folders for source in folder.glob("*.py"))})
-    return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-
-
-@cache
-def _cache(files: tuple[Path, ...], name: str = "") -> str:
-    """The cache folder of the kernels of a name that call these files; "" if none can be written."""
-    import numba
-    from numba.misc.appdirs import user_cache_dir
-
-    users = user_cache_dir("rolling-discs")  # relative if XDG_CACHE_HOME is empty, which stands for unset
-    bases = numba.config.CACHE_DIR, HERE / "__pycache__", users if Path(users).is_absolute() else ""
-    for base in filter(None, bases):
-        kept = Path(base) / f"kernels-{name}-{_content(files)}"
-        try:
-            kept.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=kept) as file:
-                file.write(bytes(ROOM))
-                file.flush()
-            os.utime(kept)
-        except OSError:
-            continue
-        _remove_earlier(kept)
-        return str(kept)
-    return ""
-
-
-def _remove_earlier(kept: Path) -> None:
-    """Remove folders of the same kernel and earlier content that no process has used for a day."""
-    for other in kept.parent.glob("kernels-*"):
-        name = other.name.rpartition("-")[0]
-        if other != kept and name in ("kernels", kept.name.rpartition("-")[0]):  # an older version named them by content alone
-            with suppress(OSError):
-                if time.time() - other.stat().st_mtime > UNUSED:
-                    shutil.rmtree(other)
-
-
-uncached: list[bool] = []  # not empty if kernels could not be cached
-
-
-def _warn_of_no_cache() -> None:
-    if not uncached:
-        uncached.append(True)
-        warn(
-            "compiled kernels cannot be kept, as neither the package's folder nor the user's cache can be written: every process "
-            "compiles them again, which takes a minute or more; set NUMBA_CACHE_DIR to a folder that can be written"
-        )
 
 
 @contextmanager
@@ -316,5 +250,5 @@ def compiling(say: Callable[[], None], after: float) -> Iterator[None]:
 
 def say_so(name: str) -> None:
     """Print that the kernels of a method are being compiled."""
-    once = "" if uncached else ", once on this machine"
+    once = "" if cache.uncached else ", once on this machine"
     print(f"compiling {name!r}{once}: a minute or so ...", file=sys.stderr, flush=True)

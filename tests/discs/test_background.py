@@ -15,7 +15,7 @@ import pytest
 from continuum import motion as fields
 from continuum import solve, untwisting_rod
 from discs import simulate
-from discs.kernels import background, compiled
+from discs.kernels import background, cache
 from discs.kernels.background import Kernels, missing
 from discs.kernels.compiled import NotReady, kernel, readily
 from discs.running import ready
@@ -43,12 +43,12 @@ def empty_cache(tmp_path, monkeypatch):
     numba = pytest.importorskip("numba")
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    compiled._cache.cache_clear()
+    cache.folder.cache_clear()
     doubled.known.clear()
     compiler = background._Compiler()
     monkeypatch.setattr(background, "COMPILER", compiler)
     yield compiler
-    compiled._cache.cache_clear()
+    cache.folder.cache_clear()
     if compiler.process is not None:
         with compiler.turn, suppress(OSError):  # all jobs are written
             compiler.process.stdin.close()

@@ -11,7 +11,7 @@ import pytest
 
 from discs.integrators.rk4 import Explicit
 from discs.kernels import __main__ as ahead
-from discs.kernels import compiled, driver
+from discs.kernels import cache, compiled, driver
 from discs.kernels.slaved import Slaved
 from discs.skew import Phase
 from tests.conftest import longer
@@ -62,7 +62,7 @@ def test_without_a_folder_for_the_cache(folder, tmp_path):
 
 
 def test_compiled_kernels_are_kept_by_all_that_they_may_call(tmp_path):
-    kept, rod = compiled._cache.__wrapped__, tmp_path / "rod.py"
+    kept, rod = cache.folder.__wrapped__, tmp_path / "rod.py"
     rod.write_text("one = 1")
     before = kept((rod,))
     assert before == kept((rod,)) != kept((Path(compiled.__file__),))
@@ -87,16 +87,16 @@ def test_earlier_kernels_go_when_nothing_uses_them(tmp_path, monkeypatch):
     monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
     rod = tmp_path / "rod.py"
     rod.write_text("one = 1")
-    first, other = Path(compiled._cache.__wrapped__((rod,), "march-A")), Path(compiled._cache.__wrapped__((rod,), "march-A-B"))
+    first, other = Path(cache.folder.__wrapped__((rod,), "march-A")), Path(cache.folder.__wrapped__((rod,), "march-A-B"))
     (first / "kernel.nbc").touch()
     rod.write_text("one = 2")
-    second = Path(compiled._cache.__wrapped__((rod,), "march-A"))
+    second = Path(cache.folder.__wrapped__((rod,), "march-A"))
     assert first.exists()
-    long_ago = time.time() - 1.5 * compiled.UNUSED
+    long_ago = time.time() - 1.5 * cache.UNUSED
     for folder in (first, second, other):
         os.utime(folder, (long_ago, long_ago))
     rod.write_text("one = 3")
-    third = Path(compiled._cache.__wrapped__((rod,), "march-A"))
+    third = Path(cache.folder.__wrapped__((rod,), "march-A"))
     assert sorted(tmp_path.glob("kernels-*")) == sorted([other, third])
 
 
