@@ -5,7 +5,8 @@ the cost back to that before the step by its transpose (`discs.analysis.sparse_t
 
     lambda_n = lambda_{n+1} + sum_i u_i,   dJ/dp += sum_i M_i . df/dp(Y_i),   M_i = h (b_i lambda_{n+1} + sum_j a_ji u_j).
 
-The midpoint rule has one stage in the middle, where V is quadratic; otherwise it takes a secant, and Gauss methods are to be taken.
+The midpoint rule has one stage in the middle. Where V is not quadratic, it takes the mean force of the step there
+(`discs.analysis.secants`).
 (Sanz-Serna, Symplectic Runge-Kutta schemes for adjoint equations, SIAM Review 58, 2016.)
 """
 
@@ -62,12 +63,11 @@ def gradient(
         "density", "spin_inertia", "torsion_stiffness", "bending_stiffness" ("heading_inertia", "stretch_stiffness",
         "shear_stiffness"), the initial state held; or of a load and its signal, as "loads[0].pattern", "loads[1].signal.rate",
         numbers and arrays of loads that are linear in positions and velocities.
-    method, dt, frames : as for `simulate`; "midpoint" (where V is quadratic: slaved headings, linear curvature) or a collocation
-        method, as "gauss4".
+    method, dt, frames : as for `simulate`; "midpoint" or a collocation method, as "gauss4".
     cost_gradient : instead of dual numbers: run -> the derivatives of the cost, arrays (F, n) by the names of its quantities.
     progress : show a progress bar for more than a second.
-    engine : as for `simulate`. With own headings, or the linear curvature, and linear loads the pass back is compiled too;
-        elsewhere it takes sparse matrices of SciPy.
+    engine : as for `simulate`. With linear loads the pass back is compiled too, for the linear curvature and, by collocation
+        methods, for own headings; elsewhere it takes sparse matrices of SciPy.
 
     Returns
     -------
@@ -120,11 +120,9 @@ def _checked(problem: Problem, method: str | Integrator) -> Integrator:
     integrator = find(method)
     if problem.system.load is not None and problem.system.load.axles:
         raise ValueError("gradient takes no motors: a motor prescribes a rate, which then has no momentum; use a Torque")
-    if isinstance(integrator, Collocated) or (isinstance(integrator, Midpoint) and problem.system.quadratic):
+    if isinstance(integrator, Collocated | Midpoint):
         return integrator
-    why = ", whose steps take a secant, as the potential is not quadratic here" if isinstance(integrator, Midpoint) else ""
-    need = "'midpoint' where the potential is quadratic, or a collocation method, as 'gauss4'"
-    raise ValueError(f"gradient takes {need}; got {integrator.name!r}{why}")
+    raise ValueError(f"gradient takes 'midpoint' or a collocation method, as 'gauss4'; got {integrator.name!r}")
 
 
 class _Adjoint:
@@ -135,7 +133,8 @@ class _Adjoint:
 
     def __init__(self, problem: Problem, integrator: Any, h: float, names: tuple[str, ...], compiled: bool) -> None:
         self.problem, self.system, self.integrator, self.h, self.names = problem, problem.system, integrator, h, names
-        self.steps, self.equations = Steps(problem, integrator, compiled), equations(problem)
+        self.steps = Steps(problem, integrator, compiled)
+        self.equations = equations(problem, self.steps.secant)
         self.sweeps, self.parameters = sweeps(self.steps), Parameters(self.equations, names)
 
     def gradient(
@@ -201,8 +200,9 @@ class _Adjoint:
 
     def _back_by_matrix(self, q: Float, pi: Float, t: float, h: float, value: Float) -> Float:
         """The value before one step with these stages."""
-        at = self.equations.at(q, pi, t + h * self.steps.rule.nodes)
-        step = tangent(self.steps.rule, h, at.each or self.equations.each(q, pi, at.t))
+        here = self.equations.over(h)
+        at = here.at(q, pi, t + h * self.steps.rule.nodes)
+        step = tangent(self.steps.rule, h, at.each or here.each(q, pi, at.t))
         u = step.stages_back(value)
         self.parameters.add_stages(at, step.rates_back(value, u))
         found: Float = value + u.sum(axis=0)

@@ -62,7 +62,7 @@ def growth(problem: Problem, dt: float | None = None, method: str = "gauss4", mo
     Parameters
     ----------
     problem : the chain, its loads, the start, and how long.
-    dt : the step; None for `suggest_dt`. method : "midpoint" (linear curvature only), "gauss4", "gauss6" or "gauss8".
+    dt : the step; None for `suggest_dt`. method : "midpoint", "gauss4", "gauss6" or "gauss8".
     most : the growth at which the computation ends.
 
     Raises

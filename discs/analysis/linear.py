@@ -81,8 +81,20 @@ class Linearised:
     @cached_property
     def unbalanced(self) -> Float:
         """g = grad V - f, (rows, n), without what motors do."""
-        gradient, load = self.system.gradient(self.shape), self.system.load
-        return gradient if load is None else gradient - load.applied(self.t, self.z.hi + self.z.lo, self.velocity)
+        load = self.system.load
+        return self.gradient if load is None else self.gradient - load.applied(self.t, self.z.hi + self.z.lo, self.velocity)
+
+    @cached_property
+    def gradient(self) -> Float:
+        """grad V, (rows, n)."""
+        return self.system.gradient(self.shape)
+
+    @cached_property
+    def forces(self) -> tuple[Matrix, Matrix]:
+        """f_q and f_v, sparse (rows n, rows n), without what motors do."""
+        if self.system.load is not None:
+            return self.system.load.derivatives(self.t, self.z.hi + self.z.lo, self.velocity)
+        return 0 * self.strains.bent, 0 * self.strains.bent
 
     @cached_property
     def rate(self) -> Float:
@@ -123,11 +135,8 @@ class Linearised:
         free = scipy.sparse.eye_array(self.free.size, format="csr")[:, self.free]
         moved = moved + c @ held  # with the momenta of motors
         own, rest = c @ free, (c @ free).T
-        force, drag = -self.strains.bent, 0 * self.strains.bent
-        if self.system.load is not None:
-            of_q, drag = self.system.load.derivatives(self.t, self.z.hi + self.z.lo, self.velocity)
-            force = force + of_q
-        return moved, own, rest @ (force + drag @ moved) - free.T @ pulled, rest @ drag @ own
+        of_q, drag = self.forces
+        return moved, own, rest @ (of_q - self.strains.bent + drag @ moved) - free.T @ pulled, rest @ drag @ own
 
     @cached_property
     def matrix(self) -> Matrix:

@@ -80,7 +80,7 @@ def lyapunov(
     ----------
     problem : a longer duration makes errors smaller.
     count : how many exponents.
-    dt : the step; None for `suggest_dt`. method : "midpoint" (linear curvature only), "gauss4", "gauss6" or "gauss8".
+    dt : the step; None for `suggest_dt`. method : "midpoint", "gauss4", "gauss6" or "gauss8".
     every : steps between orthogonalisations; growth in them must be less than numbers have digits.
     seed : of the first vectors, which are random.
 

@@ -68,7 +68,7 @@ class Parameters:
         if self._weight is not None:
             self.by_disc["density"] += (self._weight * passed.w.sum(axis=0)).sum(axis=0)
         if self._springs:
-            self._stretched = self._stretched + self._equations.stretched(passed.q, passed.w)
+            self._stretched = self._stretched + self._equations.stretched(passed)
         for load in self._loads:
             load.add(passed)
 
@@ -82,7 +82,7 @@ class Parameters:
         for name in self.by_disc:
             share = 1.0 if name == "radius" else self._equations.chain.w
             sums[INERTIAS.index(name)] = (self.basis_by(at, name) * force).sum(axis=(0, 1)) / share
-        self.add(sums, Passed(at.t, at.q, at.velocity, w))
+        self.add(sums, Passed(at.t, at.q, at.velocity, w, at.each))
 
     def basis_by(self, at: At, name: str) -> Float:
         """dC by a parameter of `by_disc`, (M, rows, n)."""

@@ -6,8 +6,7 @@ matrices A_j of the linearised equations at its stages, the tangent T is exactly
     M dY = (dy, ..., dy),   T dy = dy + h sum_j b_j A_j dY_j,   M = 1 - h (a x 1) diag(A_1, ..., A_s),
 
 and its transpose is T^T w = w + sum_j u_j with M^T u = h (b_1 A_1^T w, ..., b_s A_s^T w). M is sparse, with the bands of the step:
-T dy and T^T w take O(n). One stage is the midpoint rule; `midpoint` steps are the same for the linear curvature, where V is
-quadratic (otherwise they take a mean force that keeps the energy).
+T dy and T^T w take O(n). One stage is the midpoint rule; where V is not quadratic, its A_1 is that of `discs.analysis.secants`.
 """
 
 from collections.abc import Sequence

@@ -13,6 +13,7 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
 from discs.analysis.linear import Linearised
+from discs.analysis.secants import Secant
 from discs.arrays import Float, Matrix
 from discs.chains import stencils
 from discs.chains.chain import SteeredChain
@@ -43,12 +44,13 @@ class At(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """What the parameters of springs and loads need of M states: t (M,); q, velocity and w = C nu, (M, rows, n)."""
+    """What the parameters of springs and loads need of M states: t (M,); q, velocity and w = C nu, (M, rows, n); `At.each`."""
 
     t: Float
     q: Float
     velocity: Float
     w: Float
+    each: tuple[Linearised, ...] = ()
 
 
 class Equations:
@@ -72,7 +74,15 @@ class Equations:
         """One by one."""
         start = self.problem.start().pi.shape
         states = (Phase(place, np.zeros_like(place), p.reshape(start)) for place, p in zip(q, pi, strict=True))
-        return tuple(Linearised(self.problem, z, time) for z, time in zip(states, t.tolist(), strict=True))
+        return tuple(self.linearised(z, time) for z, time in zip(states, t.tolist(), strict=True))
+
+    def linearised(self, z: Phase, t: float) -> Linearised:
+        """At one state and time."""
+        return Linearised(self.problem, z, t)
+
+    def over(self, h: float) -> "Equations":
+        """Those at stages of steps of size h: other ones only where steps take secants."""
+        return self
 
     @cached_property
     def headings(self) -> list[tuple[int, Matrix]]:
@@ -81,16 +91,27 @@ class Equations:
 
     def dragged(self, at: At, w: Float) -> Float:
         """f_v^T w for w (M, rows, n)."""
-        if self.system.load is None:
-            return np.zeros_like(w)
-        drags = (self.system.load.derivatives(*each)[1] for each in zip(at.t.tolist(), at.q, at.velocity, strict=True))
-        return np.array([(drag.T @ part.ravel()).reshape(part.shape) for drag, part in zip(drags, w, strict=True)])
+        return np.array([(lin.forces[1].T @ part.ravel()).reshape(part.shape) for lin, part in zip(at.each, w, strict=True)])
 
-    def stretched(self, q: Float, w: Float) -> Float:
-        """The sum over states of s (B w), (springs,), for strains s and w at positions q, both (M, rows, n)."""
-        strains = (self.system.strains(self.system.shape(place)) for place in q)
-        found: Float = sum(each.strain * (each.matrix @ part.ravel()) for each, part in zip(strains, w, strict=True))
+    def stretched(self, passed: Passed) -> Float:
+        """The sum over states of s (B w), (springs,), for the strains s."""
+        strains = (lin.strains for lin in passed.each)
+        found: Float = sum(each.strain * (each.matrix @ part.ravel()) for each, part in zip(strains, passed.w, strict=True))
         return found
+
+
+class SecantEquations(Equations):
+    """Those of midpoint steps of size h that take a secant, `discs.analysis.secants`."""
+
+    def __init__(self, problem: Problem, h: float = 0.0) -> None:
+        super().__init__(problem)
+        self._h = h
+
+    def linearised(self, z: Phase, t: float) -> Linearised:
+        return Secant(self.problem, z, t, self._h)
+
+    def over(self, h: float) -> Equations:
+        return SecantEquations(self.problem, h)
 
 
 class SweptEquations(Equations):
@@ -176,8 +197,8 @@ class ConstantEquations(SweptEquations):
         tension[:, 2] = self._springs.twist * links[:, 2]
         return stencils.pull(tension, ends)
 
-    def stretched(self, q: Float, w: Float) -> Float:
-        links = self._links(q)
+    def stretched(self, passed: Passed) -> Float:
+        w, links = passed.w, self._links(passed.q)
         bends = stencils.bends(links[:, :2], self.chain.ends)
         strain = np.concatenate([bends[:, 0], bends[:, 1], links[:, 2]], axis=1)
         change = self._strains.matrix @ w.reshape(len(w), -1).T
@@ -191,12 +212,12 @@ class ConstantEquations(SweptEquations):
 class SteeredEquations(SweptEquations):
     """Those of discs with their own headings."""
 
-    def stretched(self, q: Float, w: Float) -> Float:
+    def stretched(self, passed: Passed) -> Float:
         k = self.chain.k
-        shapes = [self.system.shape(place) for place in q]
+        shapes = [self.system.shape(place) for place in passed.q]
         d, middle = (np.array([getattr(shape, name) for shape in shapes]) for name in ("d", "middle"))
         still = type(shapes[0])(*(0 * part for part in shapes[0]))
-        changes = [self.system.moved(still, part) for part in w]
+        changes = [self.system.moved(still, part) for part in passed.w]
         by_d, by_m = (np.array([getattr(change, name) for change in changes]) for name in ("d", "middle"))
         cos, sin = np.cos(middle), np.sin(middle)
         turned, along = (cos * d[:, 0] + sin * d[:, 1]) / k, (cos * d[:, 1] - sin * d[:, 0]) / k
@@ -206,8 +227,10 @@ class SteeredEquations(SweptEquations):
         return np.concatenate([part.sum(axis=0) for part in parts])
 
 
-def equations(problem: Problem) -> Equations:
-    """The linearised equations of a problem at many states."""
+def equations(problem: Problem, secant: bool = False) -> Equations:
+    """The linearised equations of a problem at many states. secant : whether steps take one."""
+    if secant:
+        return SecantEquations(problem)
     load, chain = problem.system.load, problem.chain
     linear = load is None or (isinstance(load, Linear) and load.section is None)
     if isinstance(chain, SteeredChain):

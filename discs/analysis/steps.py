@@ -36,12 +36,13 @@ class Steps:
 
     Attributes
     ----------
-    rule : the coefficients.
+    rule : the coefficients. secant : whether a step takes a secant, as the potential is not quadratic.
     """
 
     def __init__(self, problem: Problem, integrator: Any, compiled: bool) -> None:
         self.problem, self.system, self.integrator = problem, problem.system, integrator
         self.rule = tableau(1) if isinstance(integrator, Midpoint) else integrator.rule
+        self.secant = isinstance(integrator, Midpoint) and not problem.system.quadratic
         self.compiled = compiled
 
     def take(self, z: Phase, t: float, h: float, count: int) -> Taken:

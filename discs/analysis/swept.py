@@ -49,8 +49,8 @@ class Sweeps:
         if done < 0:
             raise KeyboardInterrupt
         flat, first = (-1, *q.shape[2:]), (count - done) * q.shape[1]
-        passed = Passed(times[first:], *(part.reshape(flat)[first:] for part in (q, v, w))) if rates else None
-        return done, sums, passed
+        q, v, w = (part.reshape(flat)[first:] for part in (q, v, w))
+        return done, sums, Passed(times[first:], q, v, w) if rates else None
 
     def forward(self, taken: Taken, t: float, h: float, dy: Float) -> bool:
         """Take changes dy (m, size) of the state, in place, through the one step that was taken; whether the sweeps converged."""
@@ -109,7 +109,7 @@ def _sparse(matrix: Matrix, n: int) -> Any:
 
 def sweeps(steps: Steps) -> Sweeps | None:
     """Compiled sweeps, if the steps are compiled and the linearised equations have a compiled form."""
-    found = equations(steps.problem)
+    found = equations(steps.problem, steps.secant)
     return Sweeps(steps, found) if steps.compiled and isinstance(found, SweptEquations) else None
 
 

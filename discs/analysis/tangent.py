@@ -28,7 +28,7 @@ class Flow:
 
     Parameters
     ----------
-    problem : the chain and its loads. method : "midpoint" (where V is quadratic), "gauss4", "gauss6" or "gauss8".
+    problem : the chain and its loads. method : "midpoint", "gauss4", "gauss6" or "gauss8".
     engine : as for `simulate`; None for the usual one.
 
     The unknowns y (size,) are those of `Linearised`: q, then the momenta that no motor prescribes.
@@ -36,13 +36,9 @@ class Flow:
 
     def __init__(self, problem: Problem, method: str = "gauss4", engine: str | None = None) -> None:
         integrator: Any = find(checks.choice("method (with tangents)", method, METHODS))
-        if method == "midpoint" and not problem.system.quadratic:
-            raise ValueError(
-                "tangents of midpoint steps need a quadratic potential, as that of the linear curvature; take 'gauss4'"
-            )
         self.problem = problem
         self._steps = Steps(problem, integrator, ready(problem, integrator, engine))
-        self._equations, self._sweeps = equations(problem), sweeps(self._steps)
+        self._equations, self._sweeps = equations(problem, self._steps.secant), sweeps(self._steps)
         self._first = Linearised(problem, problem.start())
         self.start = self._first.join(self._first.z.hi, self._first.z.pi)
 
@@ -67,7 +63,7 @@ class Flow:
         end = lin.join(taken.after.hi + taken.after.lo, taken.after.pi)
         if self._sweeps is not None and lin.free.all():
             return end, Swept(self._sweeps, taken, t, h)
-        return end, tangent(table, h, self._equations.each(taken.q[0], taken.pi[0], t + h * table.nodes))
+        return end, tangent(table, h, self._equations.over(h).each(taken.q[0], taken.pi[0], t + h * table.nodes))
 
 
 def units(flow: Flow) -> Float:

@@ -150,7 +150,7 @@ class SteeredSystem(RollingDiscs):
     # Springs
 
     @cached_property
-    def _joining(self) -> tuple[Matrix, Matrix]:
+    def joining(self) -> tuple[Matrix, Matrix]:
         """Sparse matrices (n_links, n): differences, and mean headings, where strains are taken."""
         points = np.arange(self._stiffness.shape[1])
 
@@ -161,15 +161,19 @@ class SteeredSystem(RollingDiscs):
 
         return joining("slope"), joining("mean")
 
-    def strains(self, shape: Links) -> Strains:
-        """With Gamma = u - (1, 0) and u = T(-m) d/k: dGamma/dm = -J u, and a second derivative by m, one by m and d."""
-        (apart, mean), section = self._joining, self.secant(shape, self._no_step)
-        scaled, none, diagonal = apart / self._k, 0 * mean, scipy.sparse.diags_array
+    def strain_matrix(self, section: Section) -> Matrix:
+        """B, sparse (springs, 4 n), of a section."""
+        (apart, mean), diagonal = self.joining, scipy.sparse.diags_array
+        scaled, none = apart / self._k, 0 * mean
         rows = [
             [diagonal(section.along[a, 0]) @ apart, diagonal(section.along[a, 1]) @ apart, none, diagonal(section.across[a]) @ mean]
             for a in (0, 1)
         ]
-        matrix = scipy.sparse.block_array([*rows, [none, none, scaled, none], [none, none, none, scaled]], format="csr")
+        return scipy.sparse.block_array([*rows, [none, none, scaled, none], [none, none, none, scaled]], format="csr")
+
+    def strains(self, shape: Links) -> Strains:
+        """With Gamma = u - (1, 0) and u = T(-m) d/k: dGamma/dm = -J u, and a second derivative by m, one by m and d."""
+        (apart, mean), section, diagonal = self.joining, self.secant(shape, self._no_step), scipy.sparse.diags_array
         stress = self._stiffness[:2] * section.strain[:2]
         u = np.array([-section.across[1], section.across[0]])
         mixed = [mean.T @ diagonal(stress[0] * section.along[1, a] - stress[1] * section.along[0, a]) @ apart for a in (0, 1)]
@@ -177,7 +181,7 @@ class SteeredSystem(RollingDiscs):
         blank = 0 * twice
         bent = [[blank] * 3 + [mixed[0].T], [blank] * 3 + [mixed[1].T], [blank] * 4, [*mixed, blank, twice]]
         bent = scipy.sparse.block_array(bent, format="csr")
-        return Strains(matrix, self._stiffness.ravel(), bent, section.strain.ravel())
+        return Strains(self.strain_matrix(section), self._stiffness.ravel(), bent, section.strain.ravel())
 
     def _strain(self, d: Float, middle: Float) -> Float:
         cos, sin, k = np.cos(middle), np.sin(middle), self._k

@@ -8,7 +8,9 @@ import pytest
 from discs import Chain, Problem, SimulationError, State, simulate
 from discs.__main__ import main
 from discs.analysis import lyapunov, modes
+from discs.analysis.linear import Linearised
 from discs.analysis.parameters import Parameters
+from discs.analysis.secants import Secant
 from discs.analysis.sparse_tangent import tangent
 from discs.analysis.stages import Equations
 from discs.analysis.steps import Steps, Taken
@@ -19,6 +21,7 @@ from discs.differences import slope
 from discs.integrators import find
 from discs.integrators.tableaux import tableau
 from discs.loads import Damping, Motor, Rest, Slope, Torque, signals
+from discs.skew import Phase
 from tests.conftest import Model, models, uneven
 
 pytestmark = pytest.mark.slow  # steps with sparse factors
@@ -43,16 +46,43 @@ def loaded(model):
 @models(CHAINS)
 def test_tangent_is_the_derivative_of_the_step(model, method):
     problem = loaded(model)
-    if method == "midpoint" and not problem.system.quadratic:
-        with pytest.raises(ValueError, match=r"tangents of midpoint steps need a quadratic potential.*take 'gauss4'"):
-            Flow(problem, method)
-        return
     flow, h, t = Flow(problem, method), 0.05, 0.3
     _, tangent = flow.step(flow.start, t, h)
     w, v = np.random.default_rng(2).normal(size=(2, flow.start.size))
     right = slope(lambda size: flow.step(flow.start + size * v, t, h)[0], 0.3)
     np.testing.assert_allclose(tangent.forward(v), right, rtol=0, atol=1e-8 * np.abs(right).max())
     assert w @ tangent.forward(v) == pytest.approx(tangent.back(w) @ v, rel=1e-12)
+
+
+@pytest.mark.parametrize("h", [0.0, 0.05, 0.9])
+@pytest.mark.parametrize(("law", "degree"), [("steered", 1), ("steered", 2), ("true", 1)])
+@pytest.mark.parametrize("ends", ["springs", "ring"])
+def test_matrix_with_a_secant_is_the_derivative_of_its_rates(ends, law, degree, h):
+    """For steps of any size, in which links turn by small and by large angles."""
+    problem, rng = uneven(6 if ends == "ring" else 7, Model(ends, law)), np.random.default_rng(4)
+    rest = Rest(curvature=0.3, stretch=0.1, shear=0.2) if law == "steered" else Rest(curvature=0.3)
+    loads = Slope(0.2, -0.4), Damping(rolling=0.3), Torque(0.3, signals.sine(1.0, 2.0)), rest
+    problem = replace(problem, chain=replace(problem.chain, degree=degree) if degree == 2 else problem.chain, loads=loads)
+    z = problem.start()
+
+    def at(y):
+        q, pi = y[: z.hi.size].reshape(z.hi.shape), y[z.hi.size :].reshape(z.pi.shape)
+        return Secant(problem, Phase(q, np.zeros_like(q), pi), 0.3, h)
+
+    y = np.concatenate([z.hi.ravel(), z.pi.ravel()])
+    y += 0.02 * rng.normal(size=y.size)
+    v, lin = rng.normal(size=y.size), at(y)
+    right = slope(lambda size: at(y + size * v).rate, 0.3)
+    np.testing.assert_allclose(lin.matrix @ v, right, rtol=0, atol=1e-10 * np.abs(right).max())
+    plain = Linearised(problem, lin.z, 0.3)
+    same = abs(lin.matrix - plain.matrix).max() < 1e-10 * abs(plain.matrix).max()
+    assert same == (h == 0)
+
+
+def test_exponents_with_a_secant_are_near_those_of_gauss_steps():
+    problem = replace(uneven(4, Model("springs", "steered")), duration=0.5)
+    secant, gauss = (lyapunov(problem, count=2, dt=0.025, method=method, every=1) for method in ("midpoint", "gauss4"))
+    np.testing.assert_allclose(secant.growth, gauss.growth, atol=0.03 * np.abs(gauss.growth).max())
 
 
 @pytest.mark.parametrize("stages", [1, 2, 4])

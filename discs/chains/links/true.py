@@ -16,6 +16,7 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
 from discs.arrays import Complex, Float
+from discs.arrays import Matrix as SparseMatrix
 from discs.chains import stencils
 from discs.chains.links.law import LinkLaw
 from discs.chains.rolling_discs import Assembly, Strains, folded
@@ -124,13 +125,7 @@ class TrueCurvature(LinkLaw):
         along = d[:2] / length
         across = np.array([-along[1], along[0]])
         link = stencils.matrix(lambda r: stencils.links(r, self._ends), n, self._ends)
-        none = scipy.sparse.csr_array(link.shape)
-        angle, longer = (
-            scipy.sparse.hstack([scipy.sparse.diags_array(a / size) @ link for a in u] + [none], format="csr")
-            for u, size in ((across, length), (along, np.ones_like(length)))
-        )
-        before, after = self._neighbours(np.arange(length.size))
-        matrix = scipy.sparse.vstack([angle[after] - angle[before], longer, scipy.sparse.hstack([none, none, link])]) / k
+        matrix = self.strain_matrix(across / length, along)
         stiffness = np.concatenate([self._bending, self._stretching, self._torsion])
         first, second = self._around(self._bending * (self._turning(d) - self._rest) / k)
         turning, stretching = (second - first) / length**2, self._stretching * (length / k - 1) / (k * length)
@@ -141,7 +136,19 @@ class TrueCurvature(LinkLaw):
         blocks = [[link.T @ scipy.sparse.diags_array(part) @ link for part in row] for row in parts]
         bent = scipy.sparse.block_diag([scipy.sparse.block_array(blocks), 0 * blocks[0][0]], format="csr")
         strain = np.concatenate([self._turning(d) - self._rest, length / k - 1, d[2] / k])
-        return Strains(matrix.tocsr(), stiffness, bent, strain)
+        return Strains(matrix, stiffness, bent, strain)
+
+    def strain_matrix(self, turn: Float, stretch: Float) -> SparseMatrix:
+        """B, sparse (springs, 3 n), for gradients of the angles and lengths of links, both (2, n_links)."""
+        link = stencils.matrix(lambda r: stencils.links(r, self._ends), self._n, self._ends)
+        none = scipy.sparse.csr_array(link.shape)
+        angle, longer = (
+            scipy.sparse.hstack([*(scipy.sparse.diags_array(a) @ link for a in u), none], format="csr") for u in (turn, stretch)
+        )
+        number: Any = np.arange(turn.shape[1])
+        before, after = self._neighbours(number)
+        parts = [angle[after] - angle[before], longer, scipy.sparse.hstack([none, none, link])]
+        return scipy.sparse.vstack(parts, format="csr") / self._k
 
     def stiffness(self, secant: Line, c: Float) -> Float:
         """Bends join a disc with its two neighbours, links join two discs."""
