@@ -94,33 +94,43 @@ def _linear(load: Any) -> bool:
 class AnyParameter(LoadParameter):
     """By differences of order 4 of the whole force at each state: rest curvature, viscosity of bending, loads of one's own.
 
-    Rest strains of several loads add up, so the force of one depends on the others.
+    Rest strains of several loads add up, so the force of one depends on the others. Those that are part of V (`Load.section`)
+    change the force of the springs.
     """
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
-        self._found, self._loads = np.zeros(self.value.shape), dict[tuple[tuple[int, ...], float], Any]()
+        self._found, self._problems = np.zeros(self.value.shape), dict[tuple[tuple[int, ...], float], Problem]()
 
     def add(self, at: Passed) -> None:
         for place in np.ndindex(self.value.shape):
-            for t, q, v, w in zip(at.t.tolist(), at.q, at.velocity, at.w, strict=True):
+            size, each = self._size(place), at.each or [None] * len(at.t)
+            elastic = self._all(place, 0.1 * size)[1].section is not None
+            for t, q, v, w, lin in zip(at.t.tolist(), at.q, at.velocity, at.w, each, strict=True):
 
-                def force(by: float, place: tuple[int, ...] = place, t: float = t, q: Float = q, v: Float = v) -> Float:
-                    found: Float = self._all(place, by).applied(t, q, v)
-                    return found
+                def force(
+                    by: float, place: Any = place, t: float = t, q: Float = q, v: Float = v, lin: Any = lin, elastic: bool = elastic
+                ) -> Float:
+                    problem, load = self._all(place, by)
+                    if elastic and lin is not None:  # the mean force, where steps take one
+                        found: Float = -replace(lin, problem=problem).unbalanced
+                        return found
+                    found = load.applied(t, q, v)
+                    return found - problem.system.gradient(problem.system.shape(q)) if elastic else found
 
-                self._found[place] += np.vdot(w, slope(force, self._size(place)))
+                self._found[place] += np.vdot(w, slope(force, size))
 
     def total(self) -> Float:
         return self._found
 
-    def _all(self, place: tuple[int, ...], by: float) -> Any:
-        """All loads together, with one entry of the parameter changed."""
-        if (place, by) not in self._loads:
+    def _all(self, place: tuple[int, ...], by: float) -> tuple[Problem, Any]:
+        """The problem with one entry of the parameter changed, and all of its loads together."""
+        if (place, by) not in self._problems:
             owner, loads = self._changed(place, by), list(self._problem.loads)
             loads[self._place] = replace(self._load, signal=owner) if self._of_signal else owner  # type: ignore[type-var]
-            self._loads[place, by] = replace(self._problem, loads=tuple(loads)).system.load
-        return self._loads[place, by]
+            self._problems[place, by] = replace(self._problem, loads=tuple(loads))
+        problem = self._problems[place, by]
+        return problem, problem.system.load
 
 
 class LinearParameter(LoadParameter):

@@ -350,6 +350,29 @@ def test_steps_that_do_not_converge_are_said():
         gradient(problem, lambda run: run.y[-1, 0], "theta", Midpoint(sweeps=2, tolerance=1e-14), 0.1, progress=False)
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.* is too long for this motion")
+@pytest.mark.parametrize(
+    ("law", "name", "value", "method"),
+    [
+        ("true", "curvature", 0.3, Midpoint(tolerance=1e-14)),
+        ("true", "curvature", 0.0, Gauss4(tolerance=1e-14)),
+        ("steered", "stretch", 0.1, Gauss4(tolerance=1e-14)),
+        ("steered", "mounting_angle", 0.2, Midpoint(tolerance=1e-14)),
+    ],
+)
+def test_gradients_by_rest_strains_of_springs_are_those_of_differences(law, name, value, method):
+    """They are no force besides that of the springs, but a part of it."""
+    problem = replace(uneven(5, Model("springs", law)), duration=0.3)
+
+    def with_rest(by):
+        return replace(problem, loads=(Rest(**{name: value + by}),))
+
+    runs = [simulate(with_rest(by), method, 0.05, [0.13, 0.3], progress=False, engine="plain") for by in (1e-6, -1e-6)]
+    found = gradient(with_rest(0.0), cost, f"loads[0].{name}", method, 0.05, [0.13, 0.3], progress=False)
+    assert found[f"loads[0].{name}"] == pytest.approx((cost(runs[0]) - cost(runs[1])) / 2e-6, rel=2e-8, abs=2e-9)
+
+
 def test_what_has_no_adjoint_is_refused():
     problem = uneven(5, Model("springs", "field"))
     motor = Motor(float(problem.initial.omega[2]), problem.chain.s[2])
