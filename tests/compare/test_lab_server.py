@@ -37,13 +37,24 @@ def served(what, **settings):
 
 async def fetched(address, **headers):
     request = client.HTTPRequest(address, headers=headers)
-    return await client.AsyncHTTPClient(force_instance=True).fetch(request, raise_error=False)
+    asking = client.AsyncHTTPClient(force_instance=True)
+    try:
+        return await asking.fetch(request, raise_error=False)
+    finally:
+        asking.close()
 
 
 async def opened(lab, origin=None, address=None, **headers):
     address = address or f"{lab.address.replace('http', 'ws')}socket"
     given = {"Origin": origin or lab.address.split("/", 3)[0] + f"//{server.HOST}:{lab.port}"} | headers
     return await websocket.websocket_connect(client.HTTPRequest(address, headers=given))
+
+
+async def shut(socket):
+    """Close a socket, and wait until it is: a loop that ends before leaves it open."""
+    socket.close()
+    while await asyncio.wait_for(socket.read_message(), 20) is not None:
+        pass
 
 
 async def read(socket):
@@ -124,7 +135,7 @@ def test_answers_messages():
         assert "kind must be one of" in refused["text"]
         await socket.write_message(json.dumps({"kind": "step", "by": "forward"}))
         assert [(await read(socket))[0]["kind"] for _ in range(3)] == ["scene", "frame", "frame"]
-        socket.close()
+        await shut(socket)
 
     served(play)
 
@@ -151,11 +162,11 @@ def test_reconnects_and_pages_at_once_leave_nothing(monkeypatch):
         for _ in range(30):
             socket = await opened(lab)
             await read(socket)
-            socket.close()
+            await shut(socket)
         sockets = [await opened(lab) for _ in range(4)]
         kinds = [(await read(socket))[0]["kind"] for socket in sockets]
         for socket in sockets:
-            socket.close()
+            await shut(socket)
         for _ in range(100):
             if not lab.pages:
                 break
@@ -173,10 +184,10 @@ def test_ends_with_its_last_page(monkeypatch):
 
     async def play(lab):
         one, other = await opened(lab), await opened(lab)
-        one.close()
+        await shut(one)
         await asyncio.sleep(0.3)
         assert not lab.ended.is_set()
-        other.close()
+        await shut(other)
         await asyncio.wait_for(lab.ended.wait(), 10)
 
     served(play)
