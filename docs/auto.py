@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compare import lump
-from compare.entrants import ours
+from compare.entrants import EXPLICIT, ours
 from compare.peers.peer import Outcome, Peer
 from compare.reference import distance, reference
 from continuum import Scene, steered_rod, untwisting_rod
@@ -65,7 +65,8 @@ def ends(run: Solution) -> Float:
 def fixed(problem: Problem, exact: Float) -> list[Run]:
     """Runs of all methods, until their error is below the least tolerance."""
     found: list[Run] = []
-    for peer in [*reversed([peer for peer in ours(problem) if peer.name not in OMITTED]), explicit(problem)]:
+    mine = [peer for peer in ours(problem) if peer.name not in OMITTED]
+    for peer in [*reversed(mine), *([explicit(problem)] if problem.chain.n <= EXPLICIT else [])]:  # never the best for more
         for setting in peer.settings:
             try:
                 times = [peer.run(setting, np.inf) for _ in range(2)]
