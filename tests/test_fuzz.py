@@ -30,7 +30,7 @@ from discs.events import FrictionExceeded, Line, Touch
 from discs.files.results import Archive, read, record
 from discs.running.outcome import from_data
 from tests.fuzz.__main__ import FAULT, answers
-from tests.fuzz.doors import ROD, N, S, parked, run, slaved, still, trailer, with_event, with_load
+from tests.fuzz.made import ROD, N, S, parked, run, slaved, still, trailer, with_event, with_load
 
 RAGGED = [[1.0], [2.0, 3.0]]
 TWO = np.array([1.0, 2.0])

@@ -31,7 +31,7 @@ import numpy as np
 
 from discs import SimulationError, checks
 from discs.kernels.background import USUAL
-from tests.fuzz import doors, odd
+from tests.fuzz import doors, made, odd
 
 ROOT = Path(__file__).parents[2]
 OURS = tuple(str(ROOT / name) for name in ("discs", "continuum", "compare"))
@@ -148,7 +148,7 @@ def main() -> int:
     p.add_argument("--words", action="store_true", help="show errors that name no argument")
     p.add_argument("--traces", action="store_true", help="show tracebacks of findings")
     chosen = p.parse_args()
-    os.chdir(doors.FOLDER)
+    os.chdir(made.FOLDER)
     USUAL[0] = "plain"  # nothing is compiled
     kinds: Counter[str] = Counter()
     for answer in answers(chosen.seed, chosen.count, 60 * chosen.minutes, chosen.only):

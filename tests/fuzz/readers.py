@@ -9,6 +9,8 @@ The first byte of an input chooses what it is: a TOML file, bytes of an archive,
 the archive of a sweep, or to the checkpoint of an ensemble.
 """
 
+import atexit
+import shutil
 import sys
 import tempfile
 import warnings
@@ -26,6 +28,7 @@ with atheris.instrument_imports(include=["discs", "continuum", "tomllib"]):
     from discs.running import recording
 
 FOLDER = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+atexit.register(shutil.rmtree, FOLDER, ignore_errors=True)
 QUANTITIES = ("x", "y", "theta", "omega", "energy")
 
 
