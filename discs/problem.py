@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -182,6 +183,11 @@ class Problem:
         """The equations of motion."""
         load = total(self.bound)
         return SteeredSystem(self.chain, load) if isinstance(self.chain, SteeredChain) else SlavedSystem(self.chain, load)
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What runs of this problem keep for later ones, see `discs.running.plan`."""
+        return {}
 
     def _positions(self) -> Float:
         return np.array([getattr(self.initial, name) for name in self.system.rows])

@@ -63,7 +63,9 @@ def begun(integrator: Integrator, because: str, want: Sequence[str], dt: float, 
         "dt": dt,
         "dt_suggested": suggested,
     }
-    return found | (Stats(plain_because=because) if because else {})
+    if because:
+        found["plain_because"] = because
+    return found
 
 
 def doubts(stats: Stats) -> list[str]:

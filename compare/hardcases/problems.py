@@ -20,6 +20,7 @@ from discs import Leapfrog, Problem, Solution, State, simulate
 from discs.arrays import Float
 from discs.loads import Damping, OnRod
 from discs.running.doubt import lost_energy
+from discs.running.plan import Plan
 from discs.running.time_loop import March
 
 # Functions of arguments that can be sent to other processes
@@ -179,7 +180,7 @@ def parasite(n: int, duration: float, method: str, seconds: float) -> Found:
     problem = posed(partial(twisted, n, "paper", duration=duration))
     k, system, begun = problem.chain.k, problem.system, processor()
     h = k**2 / 8
-    run = March(problem, Leapfrog(), h, True)
+    run = March(Plan(problem, Leapfrog()), h)
     share, onset, energy, times = 0.0, np.nan, [], np.linspace(0, duration, 401)[1:]
     for t in times:
         while run.step < round(t / h):

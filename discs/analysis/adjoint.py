@@ -97,11 +97,7 @@ def gradient(
     engine = usual() if engine is None else engine
     adjoint = _Adjoint(problem, integrator, h, names, ready(problem, integrator, engine))
     with Progress("gradient", steps_before(float(times[-1]), h)[0]) if progress else NO_BAR as bar:
-        return adjoint.gradient(times, cost, cost_gradient, engine, bar.update if bar else _unseen)
-
-
-def _unseen(step: int) -> None:
-    """No progress bar."""
+        return adjoint.gradient(times, cost, cost_gradient, engine, bar.update)
 
 
 def _names(problem: Problem, wrt: Iterable[str]) -> tuple[str, ...]:

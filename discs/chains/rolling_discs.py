@@ -8,6 +8,7 @@ import numpy as np
 import scipy  # its parts, slow to import, when they are used
 
 from discs.arrays import Float, Int, Matrix
+from discs.kernels.direct import Known
 from discs.skew import Parameters, Placed, Secant, Shape, SkewGradient
 
 
@@ -56,6 +57,7 @@ class RollingDiscs(SkewGradient):
     reach : the rates of a disc depend on so many discs to either side.
     vanishing : whether a heading can vanish.
     stiffest : upper bound of the entries of C^T (grad^2 V) C, per time squared.
+    known : machine code that was called for this chain, see `discs.kernels.direct`.
     """
 
     weights: Float
@@ -68,6 +70,10 @@ class RollingDiscs(SkewGradient):
     def rates(self) -> tuple[str, ...]:
         """Names of the rates of `rows`."""
         return tuple("omega" if row == "theta" else f"{row}_rate" for row in self.rows)
+
+    @cached_property
+    def known(self) -> Known:
+        return {}
 
     # Kinematics
 

@@ -10,6 +10,8 @@ import numpy as np
 from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.work import NO_LOOKS, NO_STOPS, NOTHING, Cut, Frame, Looks, Memory, Stops, Tally, Work
+from discs.kernels import driver
+from discs.kernels.direct import Known, direct
 from discs.skew import Parameters, Phase
 
 
@@ -167,8 +169,9 @@ class FixedStep(Integrator):
             starts = t + h * np.arange(steps + 1.0)
             times = np.add.outer(starts, h * np.array([0.0, *self.parameters.nodes]))
             chain = chain._replace(load=system.load.timed(times.ravel(), abs(h)))
-        state = type(memory)(*[np.array(array, ndmin=2) for array in memory])  # momenta (n,) are (1, n) in compiled code
-        tally = self.steps(self.twin_of(system, chain), state, t, h, steps, bound, looks, stops)
+        # momenta (n,) are (1, n) in compiled code
+        state = type(memory)(*[(array if array.ndim == 2 else array[None]).copy() for array in memory])
+        tally = self.steps(self.twin_of(system, chain), state, t, h, steps, bound, looks, stops, system.known)
         if system.load is not None and not system.load.conservative:
             tally = tally._replace(spent=chain.load.spent)
         return state if memory[-1].ndim == 2 else Phase(state.hi, state.lo, state.pi[0]), tally
@@ -184,11 +187,15 @@ class FixedStep(Integrator):
         bound: float,
         looks: Looks = NO_LOOKS,
         stops: Stops = NO_STOPS,
+        known: Known | None = None,
     ) -> Tally:
-        """Compiled steps from a state of the types of compiled code, in place. `Cut` as for `march`."""
-        import discs.kernels.driver as driver
+        """Compiled steps from a state of the types of compiled code, in place. `Cut` as for `march`.
 
-        tally = Tally(*driver.march(self.parameters, chain, state, t, h, steps, bound, *looks, *stops))
+        known : that of the chain's `RollingDiscs`; None for chains side by side.
+        """
+        own = self.parameters
+        call = driver.march if known is None else direct(known, driver.march, own, chain)
+        tally = Tally(*call(own, chain, state, t, h, steps, bound, *looks, *stops))
         if tally.steps < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut
@@ -219,8 +226,6 @@ class OneStep(FixedStep):
             z = self.step(system, memory, t, tau, work) if tau else memory
             spent, work.spent = (work.spent - before)[::2], before
             return Frame(z.hi, z.lo, system.forward(system.basis(system.shape(z.hi, z.lo)), z.pi), spent=spent)
-        import discs.kernels.driver as driver
-
         spent = NOTHING[::2]
         if tau:
             z, tally = self.march(system, chain, memory, t, tau, 1, np.inf)

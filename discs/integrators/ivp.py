@@ -14,6 +14,8 @@ from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import solvers
 from discs.integrators.base import Integrator
 from discs.integrators.work import Cut, Frame, Work
+from discs.kernels import dop853
+from discs.kernels.direct import direct
 from discs.kernels.shared import columns
 from discs.skew import Parameters, Phase
 
@@ -202,22 +204,10 @@ class DOP853(SolveIvp):
 
     def whole(self, system: RollingDiscs, chain: Parameters, z: Phase, h: float, bound: float, album: Any) -> Work | None:
         """See `discs.kernels.dop853`."""
-        from discs.kernels import dop853
-
-        state = Phase(z.hi, z.lo, np.array(z.pi, ndmin=2))
-        done, taken, evaluations = dop853.run(
-            dop853.coefficients(),
-            chain,
-            state,
-            self.rtol,
-            self.atol,
-            h,
-            bound,
-            album.times,
-            album.q,
-            album.rates,
-            album.energy_slip,
-        )
+        method, state = dop853.coefficients(), Phase(z.hi, z.lo, np.atleast_2d(z.pi))
+        run = direct(system.known, dop853.run, method, chain)
+        frames = album.times, album.q, album.rates, album.energy_slip
+        done, taken, evaluations = run(method, chain, state, self.rtol, self.atol, h, bound, *frames)
         if done < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut

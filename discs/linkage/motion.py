@@ -75,7 +75,7 @@ def _fixed(problem: LinkageProblem, h: float, times: Float, progress: bool) -> S
     z, stepper, extra = Moment(q, w, np.zeros((2, of.links))), Stepper(of), Stepper(of)
     spent, done, rows = np.zeros(2), 0, []
     total = steps_before(float(times[-1]), h)[0]
-    shown = Progress("midpoint", total) if progress else None
+    shown = Progress("midpoint", total) if progress else NO_BAR
     started = clock.perf_counter()
 
     def step(by: Stepper, z: Moment, t: float, length: float) -> tuple[Moment, Float]:
@@ -89,14 +89,13 @@ def _fixed(problem: LinkageProblem, h: float, times: Float, progress: bool) -> S
             )
             raise SimulationError(said, done, t, int(np.argmax(np.abs(z.w[2])))) from None
 
-    with shown or NO_BAR:
+    with shown:
         for time in times.tolist():
             before, rest = steps_before(time, h)
             while done < before:
                 z, more = step(stepper, z, done * h, h)
                 spent, done = spent + more, done + 1
-                if shown is not None:
-                    shown.update(done)
+                shown.update(done)
             at, more = step(extra, z, done * h, rest) if rest > 0 else (z, np.zeros(2))
             v = of.forward(at.q[3], at.w)
             rows.append((at.q, v, of.energy(at.q, at.w, time), spent + more))

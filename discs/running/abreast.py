@@ -96,8 +96,10 @@ def side_by_side(problems: Sequence[Problem], integrator: FixedStep, h: float, t
     for m, bundle in enumerate(bundles(starts.parameters, starts.chains[padded], bounds[padded])):
         stops = steps, rests, recorded[m], rates[m], energy_slip[m]
         clean[m] = advance(integrator, bundle, Phases(hi[m], lo.copy(), momenta[m]), h, watch, defects[m], stops, work[m])
-    looked = defects.reshape(len(padded), watch.looks.size, 2, rows, LANES)
-    errors = np.array([estimated(seen, last) for seen in looked]).ravel()[:count] if checked else np.zeros(count)
+    looked = np.moveaxis(defects.reshape(len(padded), watch.looks.size, 2, rows, LANES), -1, 1).reshape(
+        -1, *defects.shape[1:3], rows
+    )
+    errors = np.array([estimated(seen, last) for seen in looked[:count]]) if checked else np.zeros(count)
 
     def by_chain(values: Float) -> Float:
         """(bundles, F, n LANES) as (B, F, n)."""

@@ -26,14 +26,12 @@ class Album:
     """
 
     def __init__(self, system: RollingDiscs, times: Float, h: float) -> None:
-        self.times = times
-        self.names = *system.rows, *system.rates[2:], "energy", "rolling_residual"
+        rows, n, count = len(system.rows), system.n, times.size
+        if count > 1:
+            checks.fits(f"frames = {count}", (2 * rows * n + 2) * count)
+        self.system, self.times, self.done = system, np.ascontiguousarray(times), 0
         self.steps, self.rests = all_steps_before(times, h)
-        rows, n, self.done = len(system.rows), system.n, 0
-        if times.size > 1:
-            checks.fits(f"frames = {times.size}", (2 * rows * n + 2) * times.size)
-        self.q, self.energy_slip = np.empty((rows, times.size, n)), np.empty((2, times.size))
-        self.rates = np.empty((rows - 2, times.size, n))
+        self.q, self.rates, self.energy_slip = np.empty((rows, count, n)), np.empty((rows - 2, count, n)), np.empty((2, count))
 
     def arguments(self, first: int, stuck: int) -> Stops:
         """The arguments about frames for compiled steps, after `first` steps, of which `stuck` did not converge.
@@ -51,4 +49,7 @@ class Album:
     @property
     def rows(self) -> dict[str, Float]:
         """The frames, by the names of their quantities."""
-        return dict(zip(self.names, [*self.q, *self.rates, *self.energy_slip], strict=True))
+        found = {name: self.q[row] for row, name in enumerate(self.system.rows)}
+        found |= {name: self.rates[row] for row, name in enumerate(self.system.rates[2:])}
+        found["energy"], found["rolling_residual"] = self.energy_slip
+        return found

@@ -111,8 +111,8 @@ def _run(
     rest, done, halt = dict(enumerate(parts_of(problems, settings))), dict[int, Outcome](), Event()
     told = "" if checkpoint is None else _fingerprint(problems, settings)
     words = "checkpoint", "simulate_many", "are not of these problems or arguments"
-    shown = Progress("runs", len(problems), "run") if progress else None
-    with Archive(checkpoint, "discs.simulate_many", told, *words) as kept, shown or NO_BAR:
+    shown = Progress("runs", len(problems), "run") if progress else NO_BAR
+    with Archive(checkpoint, "discs.simulate_many", told, *words) as kept, shown:
         for found in kept.found:
             number = next((k for k, part in rest.items() if [k, *part] == found.case), None)
             if number is not None:
@@ -125,8 +125,7 @@ def _run(
             if checkpoint is not None:
                 kept.write(record([number, *rest[number]], as_data(done[number])))
             count += len(rest[number].numbers)
-            if shown is not None:
-                shown.update(count)
+            shown.update(count)
 
         calls = {k: (part, [problems[i] for i in part.numbers], settings) for k, part in rest.items()}
         pool: Any = nullcontext(executor)

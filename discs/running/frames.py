@@ -44,14 +44,14 @@ def wanted(want: Iterable[str], offers: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(checks.choice("want", name, (*WANTS, *offers)) for name in given)
 
 
-def observed(march: March, tau: float, want: tuple[str, ...], offered: bool) -> dict[str, Any]:
+def observed(march: March, tau: float) -> dict[str, Any]:
     """The quantities recorded at a frame, a time tau after the last step."""
     frame = march.frame(tau)
     t = march.step * march.h + tau
     found = march.observe(t, frame)
-    if want:
-        found |= asked(march, frame, t, want, found)
-    if offered:
+    if march.plan.want:
+        found |= asked(march, frame, t, march.plan.want, found)
+    if march.plan.offered:
         found |= march.integrator.extras(march.system, march.memory, march.h)
     return found
 

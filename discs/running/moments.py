@@ -19,8 +19,9 @@ from discs.integrators import Integrator, Work, find
 from discs.integrators.work import Frame
 from discs.kernels.background import usual
 from discs.problem import Problem, State
-from discs.running.engine import plain_because, refuse_loads
+from discs.running.engine import WAITING, plain_because, refuse_loads
 from discs.running.frames import ROUNDING, asked
+from discs.running.plan import Plan
 from discs.running.ready import kernels
 from discs.running.suggest import suggest_dt
 from discs.running.time_loop import March
@@ -135,9 +136,10 @@ def by_steps(problem: Problem, integrator: Integrator, dt: float | None, engine:
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration:
         raise ValueError(f"dt must be at most the duration, {problem.duration:g}; got {h:g}")
-    compiled = not because and bool(kernels(engine, problem, integrator, h, True, True))
+    if not because and not kernels(engine, problem, integrator, h, True, True):
+        because = WAITING
     check_steps(end, h)
-    march = March(problem, integrator, h, compiled)
+    march = March(Plan(problem, integrator, because), h)
     steps, rest = steps_before(end, h)
     last = Moment(march, march.frame(0.0), 0.0)
     while march.step < steps or rest:

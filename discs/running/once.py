@@ -2,22 +2,24 @@
 
 import time as clock
 from collections.abc import Callable, Iterable
-from functools import partial, wraps
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple, ParamSpec, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from discs import checks
 from discs.arrays import Float
-from discs.integrators import Integrator, OneStep
+from discs.integrators import Integrator
 from discs.integrators.work import Cut
+from discs.kernels.background import Kernels
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.engine import WAITING, Overtaken, plain_because, refuse_loads
 from discs.running.frames import ROUNDING, frame_times, observed, wanted
-from discs.running.progress import NO_BAR, Progress
+from discs.running.plan import Plan, records
+from discs.running.progress import NO_BAR, NoBar, Progress
 from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows
 from discs.running.step_error import Watch
@@ -28,7 +30,6 @@ from discs.solution import Solution
 from discs.stats import Stats, begun
 
 Result = TypeVar("Result")
-Given = ParamSpec("Given")
 
 
 class Asked(NamedTuple):
@@ -45,20 +46,6 @@ def run_fixed(problem: Problem, integrator: Integrator, dt: float, times: Float)
     return run_once(problem, integrator, dt, times, Asked(), checked=False)
 
 
-def _anew(once: Callable[Given, Solution]) -> Callable[Given, Solution]:
-    """Decorator: a plain run that its kernels overtake begins anew."""
-
-    @wraps(once)
-    def run(*given: Given.args, **named: Given.kwargs) -> Solution:
-        try:
-            return once(*given, **named)
-        except Overtaken:
-            return once(*given, **named)
-
-    return run
-
-
-@_anew
 def run_once(
     problem: Problem,
     integrator: Integrator,
@@ -74,10 +61,24 @@ def run_once(
     checked : estimate the error of the steps; otherwise a search asks, whose frames are times. more : further entries of `stats`.
     estimate : of the errors, if known.
     """
-    _, progress, engine, checkpoint = asked
+    try:
+        return _run(problem, integrator, dt, frames, asked, checked, more, estimate)
+    except Overtaken:  # the run begins anew
+        return _run(problem, integrator, dt, frames, asked, checked, more, estimate)
+
+
+def _run(
+    problem: Problem,
+    integrator: Integrator,
+    dt: float | None,
+    frames: int | ArrayLike,
+    asked: Asked,
+    checked: bool,
+    more: Stats | None,
+    estimate: dict[str, float] | None,
+) -> Solution:
+    """As `run_once`; `Overtaken` if a plain run is overtaken by its kernels."""
     want = () if type(asked.want) is tuple and not asked.want else wanted(asked.want, integrator.offers)
-    because = plain_because(problem, integrator, engine, want)
-    suggested = dt is None
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
         raise ValueError(f"dt must be at most the duration, {problem.duration:g}; got {h:g}")
@@ -85,66 +86,81 @@ def run_once(
     end = float(times[-1])
     if end / h > MOST_STEPS:
         check_steps(end, h)
-    system = problem.system
-    refuse_loads(problem, integrator)
-    offered = set(want) & set(integrator.offers)
-    if offered and not system.quadratic:
-        raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
-    stepwise = isinstance(integrator, OneStep) and not (integrator.in_lanes and system.lanes is not None)
-    recorded = (stepwise or integrator.runs_whole) and checkpoint is None and not want and system.load is None
-    there = bool(because) or kernels(engine, problem, integrator, h, not recorded, not progress)
-    if not there:
-        because = WAITING
-    about = begun(integrator, because, want, h, suggested) | (more or {})
-    record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about, estimate)
+    plan, there = planned(problem, integrator, asked, want, h)
+    about, checkpoint = begun(integrator, plan.because, want, h, dt is None), asked.checkpoint
+    if more:
+        about |= more
+    record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about.copy(), estimate)
     steps, rest = steps_before(end, h)
-    shown = Progress(integrator.name, steps) if progress else None
-    watch = Watch(steps, len(system.rows), system.n) if checked and not integrator.adaptive else None
+    shown = Progress(integrator.name, steps) if asked.progress else NO_BAR
+    watch = Watch(steps, len(plan.system.rows), plan.system.n) if checked and not integrator.adaptive else None
     started = clock.perf_counter()
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown or NO_BAR, record:
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown, record:
         if record.complete:
             return record.solution({})
-        album = Album(system, times, h) if recorded and not because else None
-        march = March(problem, integrator, h, not because, watch, "work_by_load" in want, album)
-        first = record.begin(march, lambda: observed(march, 0.0, want, bool(offered)))
-        if album is not None and (stepwise or _uncut(march.whole, record, 0, march)):
+        album = Album(plan.system, times, h) if plan.records else None
+        march = March(plan, h, watch, album)
+        first = 0 if checkpoint is None else record.begin(march, partial(observed, march, 0.0))
+        if album is not None and (not integrator.runs_whole or _uncut(march.whole, record, 0, march)):
             _fill(album, march, shown, record)
             record.rows, first = album.rows, times.size
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)
             while march.step < before:
                 march.on(before)
-                if because == WAITING and there:
+                if there:
                     raise Overtaken
-                if shown is not None:
-                    shown.update(march.step)
+                shown.update(march.step)
                 if checkpoint is not None:
                     record.pause(f, march)
-            frame = partial(observed, march, rest, want, bool(offered))
-            record.write(f, _uncut(frame, record, f, march))  # not kept in a variable: the next step needs the memory
+            record.write(f, _uncut(partial(observed, march, rest), record, f, march))  # not kept: the next step needs the memory
             if checkpoint is not None:
                 record.pause(f + 1, march)
         work = march.work
-        told: Stats = about | {"steps": work.taken or march.step, "gradients": work.gradients, "solves": work.solves}
-        told["unconverged"] = work.unconverged
+        about["steps"], about["gradients"], about["solves"] = work.taken or march.step, work.gradients, work.solves
+        about["unconverged"] = work.unconverged
         if work.unconverged:
-            short = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
-            told["short_steps"] = short
-            told |= _uncut(march.remedy, record, times.size, march)
+            about["short_steps"] = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
+            about |= _uncut(march.remedy, record, times.size, march)
         if watch is not None:
-            told["step_error"] = _uncut(partial(march.step_error, rest), record, times.size, march)
-        return record.solution(told | {"seconds": record.seconds + clock.perf_counter() - started}, march)
+            about["step_error"] = _uncut(partial(march.step_error, rest), record, times.size, march)
+        about["seconds"] = record.seconds + clock.perf_counter() - started
+        return record.solution(about, march)
 
 
-def _fill(album: Album, march: March, shown: Progress | None, record: Rows) -> None:
+def planned(problem: Problem, integrator: Integrator, asked: Asked, want: tuple[str, ...], h: float) -> tuple[Plan, Kernels | bool]:
+    """The plan of a run, and what becomes true if kernels overtake it. ValueError for an engine, loads or quantities in `want`
+    that do not fit.
+
+    The last plan of a problem is kept, unless its runs wait for kernels.
+    """
+    _, progress, engine, checkpoint = asked
+    last = problem.kept.get("plan")
+    if last is not None:
+        plan, for_engine, in_memory = last
+        if plan.integrator is integrator and for_engine is engine and in_memory is (checkpoint is None) and plan.want == want:
+            return plan, False
+    because = plain_because(problem, integrator, engine, want)
+    refuse_loads(problem, integrator)
+    if want and not problem.system.quadratic and not set(want).isdisjoint(integrator.offers):
+        raise ValueError(f"{integrator.offers[0]} needs a quadratic potential; that of this chain is not quadratic")
+    recorded = checkpoint is None and records(problem, integrator, want)
+    there = bool(because) or kernels(engine, problem, integrator, h, not recorded, not progress)
+    if there:
+        plan = Plan(problem, integrator, because, want, recorded and not because)
+        problem.kept["plan"] = plan, engine, checkpoint is None
+        return plan, False
+    return Plan(problem, integrator, WAITING, want), there
+
+
+def _fill(album: Album, march: March, shown: Progress | NoBar, record: Rows) -> None:
     """Take all steps of a run, and all its frames on the way."""
     frames, steps = album.steps.size, int(album.steps[-1])
     while album.done < frames:
         march.on(steps)
-        if shown is not None:
-            shown.update(march.step)
+        shown.update(march.step)
         if album.done < frames and album.steps[album.done] == march.step:  # left by compiled steps: it may fail
-            frame = partial(observed, march, float(album.rests[album.done]), (), False)
+            frame = partial(observed, march, float(album.rests[album.done]))
             album.write(_uncut(frame, record, album.done, march))
 
 

@@ -1,7 +1,6 @@
 """The progress bar of a run."""
 
 import time as clock
-from contextlib import nullcontext
 from typing import Any
 
 
@@ -29,4 +28,17 @@ class Progress:
             self._bar = tqdm(total=self._total, initial=step, desc=self._name, unit=self._unit)
 
 
-NO_BAR = nullcontext()
+class NoBar:
+    """No progress bar."""
+
+    def __enter__(self) -> "NoBar":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def update(self, step: int) -> None:
+        pass
+
+
+NO_BAR = NoBar()

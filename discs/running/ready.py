@@ -9,6 +9,7 @@ from discs.integrators import FixedStep, Integrator
 from discs.kernels.background import Kernels
 from discs.problem import Problem
 from discs.running.album import Album
+from discs.running.plan import Plan
 from discs.running.time_loop import March
 
 NOTICE = 2.0  # seconds of compiling after which a notice is printed; reading kernels from the cache does not count
@@ -39,7 +40,7 @@ def compile_kernels(problem: Problem, integrator: Integrator, h: float, asked: b
     """Compile the kernels of a run, or read them from disc."""
     album = None if asked else Album(problem.system, np.empty(0), h)
     with warnings.catch_warnings(action="ignore"):  # about the problem: the run itself warns
-        March(problem, integrator, h, True, album=album).prepare()
+        March(Plan(problem, integrator), h, album=album).prepare()
 
 
 def kinds(system: RollingDiscs, integrator: Integrator, asked: bool) -> tuple[object, ...]:

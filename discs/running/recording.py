@@ -68,7 +68,7 @@ class Rows:
 
     def solution(self, stats: Stats, march: March | None = None) -> Solution:
         """The finished run."""
-        return Solution(t=self.times, s=self.problem.chain.s, stats=stats, problem=self.problem, **self.rows)
+        return Solution.of(self.problem, self.times, stats, self.rows)
 
 
 class Recording(Rows):

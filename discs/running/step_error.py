@@ -56,7 +56,7 @@ class Watch:
     def __init__(self, steps: int, rows: int, n: int) -> None:
         count = MOST if steps > MOST * EVERY else 1 + steps // EVERY
         looks = [max(FEW, int((i + 0.5) * steps / count) + 1) for i in range(count)] if steps >= FEW else [1]
-        self.looks = np.array(looks, dtype=np.int64)
+        self.looks = np.array(looks, np.int64)
         self.steps, self.passed, self.doubted = steps, 0, False
         self.limit = DOUBTFUL / (SAFETY * (steps or 1))
         self.short = steps * n <= SHORT
@@ -103,14 +103,14 @@ class Watch:
 
     def estimate(self) -> float:
         """The estimate from the looks done so far."""
-        return float(estimated(self.defects[: self.passed], self.steps)) if self.passed else 0.0
+        return estimated(self.defects[: self.passed], self.steps) if self.passed else 0.0
 
     def again(
         self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: Float, h: float, parameters: Parameters
     ) -> float | None:
         """The error against a run with half the step, at the positions kept and at the `last` ones; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
-        size = sizes(self.defects[: self.passed])
+        size = np.array(sizes(self.defects[: self.passed].tolist()))
         steps = [*self.looks.tolist(), self.steps] if self.steps else []
         for step, place in zip(steps, [*self.places, last], strict=True):
             memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), parameters)
@@ -121,20 +121,25 @@ class Watch:
         return 4 / 3 * worst
 
 
-def estimated(seen: Float, steps: int) -> Float:
-    """The estimate of a run of some steps, or of several runs, (...), from looks (m, 2, rows, ...) as in `Watch`."""
-    mean = np.add.reduce(seen[:, 0]) / len(seen)
-    found: Float = np.maximum.reduce(mean / sizes(seen)) * SAFETY * (steps or 1)
-    return found
+def estimated(seen: Float, steps: int) -> float:
+    """The estimate of a run of some steps from looks (m, 2, rows) as in `Watch`."""
+    looks = seen.tolist()  # numbers, as arrays so small take longer
+    size, total = sizes(looks), looks[0][0]
+    for off, _ in looks[1:]:
+        total = [a + b for a, b in zip(total, off, strict=True)]
+    worst = 0.0
+    for a, b in zip(total, size, strict=True):
+        worst = max(worst, a / len(looks) / b)
+    return worst * SAFETY * (steps or 1)
 
 
-def sizes(seen: Float) -> Float:
-    """What errors are relative to, (rows, ...), from looks."""
-    size: Float = np.maximum.reduce(seen[:, 1])
-    for kind in (slice(0, 2), slice(2, None)):
-        size[kind] = np.maximum(size[kind], LEAST * np.maximum.reduce(size[kind]))
-    size[size == 0] = 1.0
-    return size
+def sizes(looks: list[list[list[float]]]) -> list[float]:
+    """What errors are relative to, for each row, from looks as lists."""
+    size = looks[0][1]
+    for _, large in looks[1:]:
+        size = [max(pair) for pair in zip(size, large, strict=True)]
+    places, angles = LEAST * max(size[:2]), LEAST * max(size[2:])
+    return [max(value, angles if row > 1 else places) or 1.0 for row, value in enumerate(size)]
 
 
 def advanced(

@@ -1,18 +1,18 @@
 """The time loop: advances a run to each output time, plain or compiled, and stops it on failure."""
 
-import sys
 from typing import Any
 
 import numpy as np
 
-from discs.integrators import FixedStep, Integrator, Work
+from discs.integrators import FixedStep, Work
 from discs.integrators.work import NO_LOOKS, NO_STOPS, Cut, Frame, Memory, Tally
+from discs.kernels import driver
 from discs.loads.motor import Held
 from discs.loads.shares import Shares
-from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.calls import heed_halt
 from discs.running.failure import SimulationError, blown_up, lost_heading
+from discs.running.plan import Plan
 from discs.running.rounding import warn_of_growth, warn_of_lost_digits
 from discs.running.step_error import SUSPECTED, Watch, converging
 from discs.skew import Phase, Placed
@@ -29,10 +29,8 @@ class March:
 
     Parameters
     ----------
-    problem, integrator, h : the problem, the method and its step.
-    compiled : use the compiled form of the chain.
+    plan : the problem, the method and the engine. h : the step.
     watch : the estimate of the error of the steps; None for none.
-    by_load : book what loads do one by one, too; for the plain form.
     album : the frames that compiled steps record; None if each frame is asked for.
 
     Attributes
@@ -43,36 +41,23 @@ class March:
     memory : the memory of the integrator.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        integrator: Integrator,
-        h: float,
-        compiled: bool,
-        watch: Watch | None = None,
-        by_load: bool = False,
-        album: Album | None = None,
-    ) -> None:
-        self.problem, self.integrator, self.h, self.watch, self.album = problem, integrator, h, watch, album
+    def __init__(self, plan: Plan, h: float, watch: Watch | None = None, album: Album | None = None) -> None:
+        self.plan, self.h, self.watch, self.album = plan, h, watch, album
+        self.problem, self.integrator, self.system = plan.problem, plan.integrator, plan.system
+        self.parameters, self.twin = plan.parameters, plan.twin
         self.stuck: list[tuple[Memory, float, int]] = []
-        self.system, self.work, self.step = problem.system, Work(), 0
-        if by_load:
-            shares = Shares(problem.bound, self.system.load)
+        self.work, self.step = Work(), 0
+        if "work_by_load" in plan.want:
+            shares = Shares(self.problem.bound, self.system.load)
             self.work = Work(spent=shares.nothing, shares=shares)
-        self.parameters = self.system.parameters if compiled else None
-        fixed: Any = None if integrator.adaptive else integrator
-        self.twin: FixedStep | None = fixed if self.parameters is not None else None  # steps compiled
-        self.explicit = integrator.stability_limit < np.inf
-        self.chunk = min(CHUNK // self.system.n or 1, CHUNK if self.system.load is None else TABLED)
-        self.bound = min(problem.blown_up, sys.float_info.max)  # an infinite energy exceeds it
-        if problem.ill_posed:
-            warn(problem.ill_posed)
-        if integrator.stability_limit == np.inf and not integrator.adaptive:
+        if self.problem.ill_posed:
+            warn(self.problem.ill_posed)
+        if plan.implicit:
             warn_of_lost_digits(self.system, h)
-        if integrator.back:
-            warn_of_growth(problem, integrator.name, integrator.back, h)
+        if self.integrator.back:
+            warn_of_growth(self.problem, self.integrator.name, self.integrator.back, h)
         self.memory: Memory = None
-        if album is None or not integrator.runs_whole:  # otherwise only if that fails
+        if album is None or not self.integrator.runs_whole:  # otherwise only if that fails
             self._begin()
 
     def _begin(self) -> None:
@@ -81,17 +66,17 @@ class March:
     def prepare(self) -> None:
         """Call the kernels of the run once, which compiles them (once per machine) or reads them from disc (once per process)."""
         if self.twin is not None:
-            self.twin.march(self.system, self.parameters, self.memory, 0.0, self.h, 0, self.bound)
+            self.twin.march(self.system, self.parameters, self.memory, 0.0, self.h, 0, self.plan.bound)
         elif self.album is not None:
             nothing = Album(self.system, self.album.times[:0], self.h)
-            self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.bound, nothing)
+            self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.plan.bound, nothing)
         if self.album is None:  # frames are asked for, by a kernel of its own
             self.observe(0.0, self.integrator.at(self.system, self.memory, 0.0, 0.0, self.h, self.work, self.parameters))
 
     def whole(self) -> bool:
         """Take the whole run at once; False if the method cannot or the run fails, which then goes step by step."""
         assert self.album is not None
-        work = self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.bound, self.album)
+        work = self.integrator.whole(self.system, self.parameters, self.problem.start(), self.h, self.plan.bound, self.album)
         if work is None:
             self._begin()
             return False
@@ -125,12 +110,12 @@ class March:
             if self.twin is None:
                 taken = self._plain()
             else:
-                steps = min(self.chunk, step - self.step)
+                steps = min(CHUNK // self.system.n or 1, step - self.step, CHUNK if self.system.load is None else TABLED)
                 if watch is not None:
                     steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.arguments(self.step))
                 stops = NO_STOPS if album is None else album.arguments(self.step, self.work.unconverged)
                 self.memory, tally = self.twin.march(
-                    self.system, self.parameters, before, self.step * self.h, self.h, steps, self.bound, looks, stops
+                    self.system, self.parameters, before, self.step * self.h, self.h, steps, self.plan.bound, looks, stops
                 )
                 taken = self._accept(self.twin, before, tally)
                 if album is not None:
@@ -191,7 +176,7 @@ class March:
             time = self.step * self.h + tau
             if self.parameters is not None and self.system.load is not None and not np.isfinite(frame.rate).all():
                 self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, Work())  # as in `_accept`
-            by_velocity = self.explicit or self.work.unconverged > stuck
+            by_velocity = self.plan.explicit or self.work.unconverged > stuck
             lost = frame.lost if frame.lost >= 0 else self._lost(self.memory, frame, tau, by_velocity)
             self._check_heading(lost, self.step, time, self.memory)
             self._check_energy(self.system.kinetic(frame.rate), frame, self.step, time)
@@ -203,8 +188,6 @@ class March:
         if frame.seen is not None:
             q, energy, slip = frame.seen
         elif self.parameters is not None:
-            import discs.kernels.driver as driver
-
             q = np.empty_like(frame.hi)
             energy, slip = driver.observe(self.parameters, frame.hi, frame.lo, frame.rate, q)
         else:
@@ -235,7 +218,7 @@ class March:
         except ArithmeticError as error:
             raise SimulationError(f"the run failed: {error}", self.step, self.step * self.h, 0) from None
         # not leapfrog, whose memory is no `Phase`: its moves are its velocities
-        by_velocity = self.work.unconverged > stuck or (self.explicit and isinstance(previous, Phase))
+        by_velocity = self.work.unconverged > stuck or (self.plan.explicit and isinstance(previous, Phase))
         self._check(self._lost(previous, self.memory, self.h, by_velocity), self.step + 1, previous)
         if self.watch is not None and self.watch.look(self.step + 1, previous.hi, self.memory.hi):
             self._compare(self.watch, previous)
@@ -259,7 +242,7 @@ class March:
         self.work.add(tally)
         if tally.lost >= 0 or tally.blown:
             done, start = tally.steps - 1, self.step * self.h
-            previous, _ = twin.march(self.system, self.parameters, previous, start, self.h, done, self.bound)
+            previous, _ = twin.march(self.system, self.parameters, previous, start, self.h, done, self.plan.bound)
             if self.system.load is not None:  # a bad value of a user's function is NaN in compiled steps; plain ones raise
                 self.integrator.advance(self.system, previous, start + done * self.h, self.h, Work())
             self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
@@ -280,7 +263,7 @@ class March:
             raise lost_heading(getattr(self.problem.chain, "rolling", None), step, time, lost, slope)
 
     def _check_energy(self, kinetic: float, frame: Frame | None, step: int, time: float) -> None:
-        if kinetic <= self.bound:
+        if kinetic <= self.plan.bound:
             return
         frame = frame or self.integrator.at(self.system, self.memory, time, 0.0, self.h, self.work, None)
         raise blown_up(self.integrator, self.h, kinetic, frame, self.work.unconverged, step, time)
