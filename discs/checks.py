@@ -203,6 +203,8 @@ def _doubles(value: ArrayLike) -> Float | str:
     """`value` as a new float array, or the reason why it is none ("" if it is obvious)."""
     if type(value) is float or (type(value) is np.ndarray and value.dtype == np.float64):  # most are: nothing can be wrong
         return np.array(value)
+    if isinstance(value, (list, tuple)) and set(map(type, value)) == {float}:
+        return np.array(value)
     if isinstance(value, TEXTS):
         return ""
     try:

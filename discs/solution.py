@@ -177,13 +177,13 @@ class Solution(Result):
     events: tuple[Occurrence, ...] = ()
 
     @classmethod
-    def of(cls, problem: Problem, t: Float, stats: Stats, rows: Mapping[str, Float]) -> "Solution":
+    def of(cls, problem: Problem, s: Float, t: Float, stats: Stats, rows: Mapping[str, Float]) -> "Solution":
         """A run of a problem with the recorded `rows`: what else there is has its default, which the class holds.
 
         (A frozen dataclass sets each of its thirty attributes by a call, which takes a fifth of a short run.)
         """
         run = cls.__new__(cls)
-        vars(run).update(rows, t=t, s=problem.chain.s, stats=stats, problem=problem)
+        vars(run).update(rows, t=t, s=s, stats=stats, problem=problem)
         return run
 
     @property

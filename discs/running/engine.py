@@ -9,10 +9,6 @@ ENGINES = ("auto", "ready", "compiled", "plain")
 WAITING = "its kernels are not compiled yet"
 
 
-class Overtaken(Exception):
-    """The kernels of a plain run are there."""
-
-
 def refuse_loads(problem: Problem, integrator: Integrator) -> None:
     """ValueError for loads that the method cannot take."""
     if not integrator.takes_loads and not problem.conserves:

@@ -21,6 +21,8 @@ def frame_times(frames: int | ArrayLike, duration: float) -> Float:
 
     A time beyond the duration by no more than rounding counts as its end: `np.arange(0, 0.35, 0.1)` ends just above 0.3.
     """
+    if type(frames) is int and frames == 1:
+        return np.array([duration])
     if type(frames) is int or (not isinstance(frames, (list, tuple)) and np.ndim(frames) == 0):
         count = checks.whole("frames", frames, 1, "the last state is always one")
         if count == 1:
@@ -29,6 +31,8 @@ def frame_times(frames: int | ArrayLike, duration: float) -> Float:
         return np.linspace(0.0, duration, count)
     need = f"increasing times within [0, {duration:g}], or their number"
     times = checks.array("frames", frames, need)
+    if times.ndim == 1 and times.size and times[0] >= 0 and times[-1] <= duration and (times[1:] > times[:-1]).all():
+        return times
     near = np.clip(times, 0.0, duration)
     times = np.where(np.abs(times - near) <= ROUNDING * duration, near, times)
     if times.ndim != 1 or not times.size or not np.isfinite(times).all():

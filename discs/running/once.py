@@ -16,15 +16,15 @@ from discs.integrators.work import Cut
 from discs.kernels.background import Kernels
 from discs.problem import Problem
 from discs.running.album import Album
-from discs.running.engine import WAITING, Overtaken, plain_because, refuse_loads
+from discs.running.engine import WAITING, plain_because, refuse_loads
 from discs.running.frames import ROUNDING, frame_times, observed, wanted
 from discs.running.plan import Plan, records
-from discs.running.progress import NO_BAR, NoBar, Progress
+from discs.running.progress import NO_BAR, Progress
 from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows
 from discs.running.step_error import Watch
 from discs.running.suggest import suggest_dt
-from discs.running.time_loop import March
+from discs.running.time_loop import March, quiet
 from discs.running.whole_steps import MOST_STEPS, check_steps, steps_before
 from discs.solution import Solution
 from discs.stats import Stats, begun
@@ -61,23 +61,7 @@ def run_once(
     checked : estimate the error of the steps; otherwise a search asks, whose frames are times. more : further entries of `stats`.
     estimate : of the errors, if known.
     """
-    try:
-        return _run(problem, integrator, dt, frames, asked, checked, more, estimate)
-    except Overtaken:  # the run begins anew
-        return _run(problem, integrator, dt, frames, asked, checked, more, estimate)
-
-
-def _run(
-    problem: Problem,
-    integrator: Integrator,
-    dt: float | None,
-    frames: int | ArrayLike,
-    asked: Asked,
-    checked: bool,
-    more: Stats | None,
-    estimate: dict[str, float] | None,
-) -> Solution:
-    """As `run_once`; `Overtaken` if a plain run is overtaken by its kernels."""
+    _, progress, _, checkpoint = asked
     want = () if type(asked.want) is tuple and not asked.want else wanted(asked.want, integrator.offers)
     h = suggest_dt(problem, integrator) if dt is None else checks.number("dt", dt, positive=True)
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
@@ -87,43 +71,39 @@ def _run(
     if end / h > MOST_STEPS:
         check_steps(end, h)
     plan, there = planned(problem, integrator, asked, want, h)
-    about, checkpoint = begun(integrator, plan.because, want, h, dt is None), asked.checkpoint
+    about = begun(integrator, plan.because, want, h, dt is None)
     if more:
         about |= more
-    record: Rows = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about.copy(), estimate)
-    steps, rest = steps_before(end, h)
-    shown = Progress(integrator.name, steps) if asked.progress else NO_BAR
+    (steps, rest), started = steps_before(end, h), clock.perf_counter()
     watch = Watch(steps, len(plan.system.rows), plan.system.n) if checked and not integrator.adaptive else None
-    started = clock.perf_counter()
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), shown, record:
+    march, first = None, 0
+    if plan.records:
+        album = Album(plan.system, times, h)
+        march = March(plan, h, watch, album)
+        if not integrator.runs_whole or _uncut(march.whole):
+            _fill(album, march, progress)
+            about |= _told(march, times, rest)
+            about["seconds"] = clock.perf_counter() - started
+            return Solution.of(problem, plan.s.copy(), times, about, album.rows)
+    record = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about.copy(), estimate)
+    with quiet(), Progress(integrator.name, steps) if progress else NO_BAR as shown, record:
         if record.complete:
             return record.solution({})
-        album = Album(plan.system, times, h) if plan.records else None
-        march = March(plan, h, watch, album)
-        first = 0 if checkpoint is None else record.begin(march, partial(observed, march, 0.0))
-        if album is not None and (not integrator.runs_whole or _uncut(march.whole, record, 0, march)):
-            _fill(album, march, shown, record)
-            record.rows, first = album.rows, times.size
+        march = march or March(plan, h, watch)
+        if checkpoint is not None:
+            first = record.begin(march, partial(observed, march, 0.0))
         for f in range(first, times.size):
             before, rest = steps_before(float(times[f]), h)
             while march.step < before:
                 march.on(before)
-                if there:
-                    raise Overtaken
+                if there:  # kernels overtake the run, which begins anew
+                    return run_once(problem, integrator, dt, frames, asked, checked, more, estimate)
                 shown.update(march.step)
-                if checkpoint is not None:
-                    record.pause(f, march)
-            record.write(f, _uncut(partial(observed, march, rest), record, f, march))  # not kept: the next step needs the memory
-            if checkpoint is not None:
-                record.pause(f + 1, march)
-        work = march.work
-        about["steps"], about["gradients"], about["solves"] = work.taken or march.step, work.gradients, work.solves
-        about["unconverged"] = work.unconverged
-        if work.unconverged:
-            about["short_steps"] = sum(steps_before(time, h)[1] > 0 for time in times.tolist())
-            about |= _uncut(march.remedy, record, times.size, march)
-        if watch is not None:
-            about["step_error"] = _uncut(partial(march.step_error, rest), record, times.size, march)
+                record.pause(f, march)
+            pause = partial(record.pause, f, march)
+            record.write(f, _uncut(partial(observed, march, rest), pause))  # not kept in a variable: the next step needs the memory
+            record.pause(f + 1, march)
+        about |= _told(march, times, rest, partial(record.pause, times.size, march))
         about["seconds"] = record.seconds + clock.perf_counter() - started
         return record.solution(about, march)
 
@@ -153,21 +133,39 @@ def planned(problem: Problem, integrator: Integrator, asked: Asked, want: tuple[
     return Plan(problem, integrator, WAITING, want), there
 
 
-def _fill(album: Album, march: March, shown: Progress | NoBar, record: Rows) -> None:
-    """Take all steps of a run, and all its frames on the way."""
+def _fill(album: Album, march: March, progress: bool) -> None:
+    """Take all steps of a run, and its frames on the way."""
     frames, steps = album.steps.size, int(album.steps[-1])
-    while album.done < frames:
+    if album.done < frames:
         march.on(steps)
-        shown.update(march.step)
-        if album.done < frames and album.steps[album.done] == march.step:  # left by compiled steps: it may fail
-            frame = partial(observed, march, float(album.rests[album.done]))
-            album.write(_uncut(frame, record, album.done, march))
+    if album.done == frames:  # as after most runs, which take one call
+        return
+    with quiet(), Progress(march.integrator.name, steps) if progress else NO_BAR as shown:
+        while album.done < frames:
+            if album.steps[album.done] == march.step:  # a frame that compiled steps left: it may fail
+                album.write(_uncut(partial(observed, march, float(album.rests[album.done]))))
+            else:
+                march.on(steps)
+                shown.update(march.step)
 
 
-def _uncut(call: Callable[[], Result], record: Rows, f: int, march: March) -> Result:
-    """The result of a call, repeated where Ctrl-C cuts it short without an exception, unless the run ends before frame f."""
+def _told(march: March, times: Float, rest: float, pause: Callable[[], object] = int) -> Stats:
+    """What stats say of a finished run, whose last frame was a time `rest` after a step. pause : see `_uncut`."""
+    work = march.work
+    told: Stats = {"steps": work.taken or march.step, "gradients": work.gradients, "solves": work.solves}
+    told["unconverged"] = work.unconverged
+    if work.unconverged:
+        told["short_steps"] = sum(steps_before(time, march.h)[1] > 0 for time in times.tolist())
+        told |= _uncut(march.remedy, pause)
+    if march.watch is not None:
+        told["step_error"] = _uncut(partial(march.step_error, rest), pause)
+    return told
+
+
+def _uncut(call: Callable[[], Result], pause: Callable[[], object] = int) -> Result:
+    """The result of a call, repeated where Ctrl-C cuts it short without an exception, unless `pause` ends the run."""
     while True:
         try:
             return call()
         except Cut:
-            record.pause(f, march)
+            pause()

@@ -19,7 +19,8 @@ class Plan:
 
     Attributes
     ----------
-    system : the equations of motion. parameters : of the chain for compiled code; None on the plain engine.
+    system : the equations of motion. s : places of the discs, (n,).
+    parameters : of the chain for compiled code; None on the plain engine.
     twin : the method, if its steps are compiled; otherwise None.
     offered : whether quantities are asked for that the method offers.
     explicit : whether the step is limited by stability. implicit : whether a fixed step is not. bound : blow-up threshold.
@@ -29,7 +30,7 @@ class Plan:
         self, problem: Problem, integrator: Integrator, because: str = "", want: tuple[str, ...] = (), records: bool = False
     ) -> None:
         self.problem, self.integrator, self.because, self.want, self.records = problem, integrator, because, want, records
-        self.system = problem.system
+        self.system, self.s = problem.system, problem.chain.s
         self.parameters = None if because else self.system.parameters
         self.twin = integrator if self.parameters is not None and isinstance(integrator, FixedStep) else None
         self.offered = not set(want).isdisjoint(integrator.offers)

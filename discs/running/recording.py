@@ -68,7 +68,7 @@ class Rows:
 
     def solution(self, stats: Stats, march: March | None = None) -> Solution:
         """The finished run."""
-        return Solution.of(self.problem, self.times, stats, self.rows)
+        return Solution.of(self.problem, self.problem.chain.s, self.times, stats, self.rows)
 
 
 class Recording(Rows):

@@ -66,6 +66,8 @@ class Watch:
     def arguments(self, first: int) -> Looks:
         """The arguments about looks for compiled steps, after `first` steps."""
         k = self.passed
+        if not k:
+            return first, self.looks, self.places, self.defects, self.limit
         return first, self.looks[k:], self.places[k if self.short else 0 :], self.defects[k:], self.limit
 
     def look(self, step: int, before: Float, after: Float) -> bool:

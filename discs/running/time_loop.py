@@ -24,6 +24,11 @@ CHUNK = 4_000_000  # discs times steps of one compiled call; progress is shown b
 TABLED = 20_000  # steps of one compiled call whose loads have tables of their signals
 
 
+def quiet() -> Any:
+    """Within it NumPy does not warn of what is not finite, as of a run that blows up, which is told by an error."""
+    return np.errstate(over="ignore", invalid="ignore", divide="ignore")
+
+
 class March:
     """The state of a run, advanced step by step.
 
@@ -132,8 +137,9 @@ class March:
 
     def _compare(self, watch: Watch, before: Memory) -> None:
         """Compare the last step with a more accurate one."""
-        finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.parameters)
-        watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
+        with quiet():
+            finer = self.integrator.finer(self.system, before, self.step * self.h, self.h, self.parameters)
+            watch.compare(self.memory.hi, self.memory.hi if finer is None else finer)
 
     def step_error(self, rest: float) -> float:
         """The estimated error of a run that ends a time `rest` after its last step."""
@@ -141,15 +147,22 @@ class March:
         if watch is None:
             return 0.0
         if rest and not watch.steps:
+            self._compare_rest(watch, rest)
+        found = watch.estimate()
+        if watch.short and SUSPECTED[0] < found < SUSPECTED[1] and not self.stuck and isinstance(integrator, FixedStep):
+            with quiet():
+                again = watch.again(self.system, self.problem.start(), integrator, self.memory.hi, self.h, self.parameters)
+            return found if again is None else again
+        return found
+
+    def _compare_rest(self, watch: Watch, rest: float) -> None:
+        """Compare the only step of a run, to its last frame, with a more accurate one."""
+        integrator = self.integrator
+        with quiet():
             memory = integrator.begin(self.system, self.problem.start(), rest, Work(), self.parameters)
             finer = integrator.finer(self.system, memory, 0.0, rest, self.parameters)
             one = integrator.at(self.system, memory, 0.0, rest, rest, Work(), self.parameters)
             watch.compare(one.hi, one.hi if finer is None else finer)
-        found = watch.estimate()
-        if watch.short and SUSPECTED[0] < found < SUSPECTED[1] and not self.stuck and isinstance(integrator, FixedStep):
-            again = watch.again(self.system, self.problem.start(), integrator, self.memory.hi, self.h, self.parameters)
-            return found if again is None else again
-        return found
 
     def _remember(self, before: Memory, steps: int, stuck: int) -> None:
         """Keep the state before unconverged steps whenever their number has doubled: the first one and the last three."""
@@ -160,8 +173,9 @@ class March:
         """The entry `converging_dt` of stats, a time step with which the run's steps converge; empty if there is none to find."""
         if not self.stuck or not isinstance(self.integrator, FixedStep):
             return {}
-        tried = (converging(self.system, self.integrator, *place, self.h, self.parameters) for place in self.stuck)
-        return {"converging_dt": min(tried)}
+        with quiet():
+            tried = (converging(self.system, self.integrator, *place, self.h, self.parameters) for place in self.stuck)
+            return {"converging_dt": min(tried)}
 
     def frame(self, tau: float) -> Frame:
         """The discs a time 0 <= tau < h after the last step; raises `Cut` if Ctrl-C was pressed and its handler did not raise."""
@@ -241,17 +255,22 @@ class March:
         watch = self.watch
         self.work.add(tally)
         if tally.lost >= 0 or tally.blown:
-            done, start = tally.steps - 1, self.step * self.h
-            previous, _ = twin.march(self.system, self.parameters, previous, start, self.h, done, self.plan.bound)
-            if self.system.load is not None:  # a bad value of a user's function is NaN in compiled steps; plain ones raise
-                self.integrator.advance(self.system, previous, start + done * self.h, self.h, Work())
-            self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
+            self._fail(twin, previous, tally)
         if watch is not None:
             if watch.doubted:
                 self._compare(watch, previous)
             else:
                 watch.passed, watch.doubted = watch.passed + tally.passed, tally.doubted
         return tally.steps
+
+    def _fail(self, twin: FixedStep, previous: Memory, tally: Tally) -> None:
+        """Raise the error of compiled steps from the memory `previous`, the last of which failed."""
+        done, start = tally.steps - 1, self.step * self.h
+        with quiet():
+            previous, _ = twin.march(self.system, self.parameters, previous, start, self.h, done, self.plan.bound)
+            if self.system.load is not None:  # a bad value of a user's function is NaN in compiled steps; plain ones raise
+                self.integrator.advance(self.system, previous, start + done * self.h, self.h, Work())
+            self._check(tally.lost if tally.lost >= 0 else None, self.step + tally.steps, previous)
 
     def _check(self, lost: int | None, step: int, before: Memory) -> None:
         self._check_heading(lost, step, step * self.h, before)
