@@ -9,6 +9,9 @@ from discs.arrays import Float, Int
 from discs.loads.shares import Shares
 from discs.skew import Load, Phase, add
 
+NOTHING = np.zeros(4)  # spent by a run without loads
+NOTHING.flags.writeable = False
+
 
 @dataclass
 class Work:
@@ -29,7 +32,7 @@ class Work:
     solves: int = 0
     unconverged: int = 0
     taken: int = 0
-    spent: Float = field(default_factory=lambda: np.zeros(4))
+    spent: Float = field(default_factory=lambda: NOTHING)
     shares: Shares | None = None
 
     def add(self, tally: "Tally") -> None:
@@ -67,8 +70,6 @@ class Work:
         work[0], work[1:][self.shares.motors] = gains @ means, gains * means
         self.book(work, 0.0 * work)
 
-
-NOTHING = np.zeros(4)  # spent by a run without loads
 
 
 class Tally(NamedTuple):

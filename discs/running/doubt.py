@@ -70,7 +70,7 @@ def lost_energy(problem: Problem, method: str, t: Float, energy: Float, run: Sol
         paths = np.stack([getattr(run, row) for row in problem.system.rows], axis=1)
         most = max(float(e) - load.potential(time, q) for time, e, q in zip(t, energy, paths, strict=True))
     allowed = ENERGY_DRIFT_WARNING * most
-    if np.dot(off, off) < allowed * allowed:  # then none is larger than allowed; a quick test, which most runs pass
+    if off.dot(off) < allowed * allowed:  # then none is larger than allowed; a quick test, which most runs pass
         return ""
     worst = int(np.abs(off).argmax())
     if abs(off[worst]) <= allowed:

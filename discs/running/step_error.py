@@ -105,6 +105,8 @@ class Watch:
 
     def estimate(self) -> float:
         """The estimate from the looks done so far."""
+        if self.passed == self.looks.size:
+            return estimated(self.defects, self.steps)
         return estimated(self.defects[: self.passed], self.steps) if self.passed else 0.0
 
     def again(
@@ -125,23 +127,24 @@ class Watch:
 
 def estimated(seen: Float, steps: int) -> float:
     """The estimate of a run of some steps from looks (m, 2, rows) as in `Watch`."""
-    looks = seen.tolist()  # numbers, as arrays so small take longer
-    size, total = sizes(looks), looks[0][0]
+    looks, worst = seen.tolist(), 0.0  # numbers, as NumPy takes longer for arrays so small
+    total, size = looks[0][0], sizes(looks)
     for off, _ in looks[1:]:
         total = [a + b for a, b in zip(total, off, strict=True)]
-    worst = 0.0
-    for a, b in zip(total, size, strict=True):
-        worst = max(worst, a / len(looks) / b)
-    return worst * SAFETY * (steps or 1)
+    for row, most in enumerate(size):
+        if total[row] > worst * most:
+            worst = total[row] / most
+    return worst / len(looks) * SAFETY * (steps or 1)
 
 
 def sizes(looks: list[list[list[float]]]) -> list[float]:
     """What errors are relative to, for each row, from looks as lists."""
     size = looks[0][1]
     for _, large in looks[1:]:
-        size = [max(pair) for pair in zip(size, large, strict=True)]
+        size = list(map(max, size, large))
     places, angles = LEAST * max(size[:2]), LEAST * max(size[2:])
-    return [max(value, angles if row > 1 else places) or 1.0 for row, value in enumerate(size)]
+    least = places, places, angles, angles
+    return [most if most > least[row] else least[row] or 1.0 for row, most in enumerate(size)]
 
 
 def advanced(
