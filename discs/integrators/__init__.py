@@ -31,9 +31,9 @@ METHODS = _methods()
 
 def find(method: str | Integrator) -> Integrator:
     """The integrator of a name, with default settings; an integrator is returned unchanged."""
-    if isinstance(method, Integrator):
-        return method
-    return _standard(method if isinstance(method, str) and method in METHODS else checks.choice("method", method, METHODS))
+    if isinstance(method, str) and method in METHODS:
+        return _standard(method)
+    return method if isinstance(method, Integrator) else _standard(checks.choice("method", method, METHODS))
 
 
 @cache

@@ -204,7 +204,7 @@ class DOP853(SolveIvp):
 
     def whole(self, system: RollingDiscs, chain: Parameters, z: Phase, h: float, bound: float, album: Any) -> Work | None:
         """See `discs.kernels.dop853`."""
-        method, state = dop853.coefficients(), Phase(z.hi, z.lo, np.atleast_2d(z.pi))
+        method, state = dop853.coefficients(), Phase(z.hi, z.lo, z.pi if z.pi.ndim == 2 else z.pi[None])
         run = direct(system.known, dop853.run, method, chain)
         frames = album.times, album.q, album.rates, album.energy_slip
         done, taken, evaluations = run(method, chain, state, self.rtol, self.atol, h, bound, *frames)

@@ -16,7 +16,7 @@ class Album:
 
     Parameters
     ----------
-    times : (F,), of the frames. h : the step.
+    times : (F,), of the frames. h : the step. last : whole steps before the last frame, and the time from there.
 
     Attributes
     ----------
@@ -25,12 +25,15 @@ class Album:
     energy_slip : (2, F), energy and largest slip.
     """
 
-    def __init__(self, system: RollingDiscs, times: Float, h: float) -> None:
+    def __init__(self, system: RollingDiscs, times: Float, h: float, last: tuple[int, float] | None = None) -> None:
         rows, n, count = len(system.rows), system.n, times.size
         if count > 1:
             checks.fits(f"frames = {count}", (2 * rows * n + 2) * count)
         self.system, self.times, self.done = system, np.ascontiguousarray(times), 0
-        self.steps, self.rests = all_steps_before(times, h)
+        if count == 1 and last is not None:
+            self.steps, self.rests = np.array([last[0]]), np.array([last[1]])
+        else:
+            self.steps, self.rests = all_steps_before(times, h)
         self.q, self.rates, self.energy_slip = np.empty((rows, count, n)), np.empty((rows - 2, count, n)), np.empty((2, count))
 
     def arguments(self, first: int, stuck: int) -> Stops:
@@ -49,7 +52,9 @@ class Album:
     @property
     def rows(self) -> dict[str, Float]:
         """The frames, by the names of their quantities."""
-        found = {name: self.q[row] for row, name in enumerate(self.system.rows)}
-        found |= {name: self.rates[row] for row, name in enumerate(self.system.rates[2:])}
-        found["energy"], found["rolling_residual"] = self.energy_slip
+        found = {"energy": self.energy_slip[0], "rolling_residual": self.energy_slip[1]}
+        for row, name in enumerate(self.system.rows):
+            found[name] = self.q[row]
+        for row, name in enumerate(self.system.rates[2:]):
+            found[name] = self.rates[row]
         return found

@@ -74,15 +74,16 @@ def run_once(
     about = begun(integrator, plan.because, want, h, dt is None)
     if more:
         about |= more
-    (steps, rest), started = steps_before(end, h), clock.perf_counter()
+    last, started = steps_before(end, h), clock.perf_counter()
+    steps, rest = last
     watch = Watch(steps, len(plan.system.rows), plan.system.n) if checked and not integrator.adaptive else None
     march, first = None, 0
     if plan.records:
-        album = Album(plan.system, times, h)
+        album = Album(plan.system, times, h, last)
         march = March(plan, h, watch, album)
         if not integrator.runs_whole or _uncut(march.whole):
-            _fill(album, march, progress)
-            about |= _told(march, times, rest)
+            _fill(album, march, steps, progress)
+            _tell(about, march, times, rest)
             about["seconds"] = clock.perf_counter() - started
             return Solution.of(problem, plan.s.copy(), times, about, album.rows)
     record = Rows(problem, times) if checkpoint is None else Recording(problem, times, checkpoint, about.copy(), estimate)
@@ -103,7 +104,7 @@ def run_once(
             pause = partial(record.pause, f, march)
             record.write(f, _uncut(partial(observed, march, rest), pause))  # not kept in a variable: the next step needs the memory
             record.pause(f + 1, march)
-        about |= _told(march, times, rest, partial(record.pause, times.size, march))
+        _tell(about, march, times, rest, partial(record.pause, times.size, march))
         about["seconds"] = record.seconds + clock.perf_counter() - started
         return record.solution(about, march)
 
@@ -133,9 +134,9 @@ def planned(problem: Problem, integrator: Integrator, asked: Asked, want: tuple[
     return Plan(problem, integrator, WAITING, want), there
 
 
-def _fill(album: Album, march: March, progress: bool) -> None:
+def _fill(album: Album, march: March, steps: int, progress: bool) -> None:
     """Take all steps of a run, and its frames on the way."""
-    frames, steps = album.steps.size, int(album.steps[-1])
+    frames = album.times.size
     if album.done < frames:
         march.on(steps)
     if album.done == frames:  # as after most runs, which take one call
@@ -149,17 +150,16 @@ def _fill(album: Album, march: March, progress: bool) -> None:
                 shown.update(march.step)
 
 
-def _told(march: March, times: Float, rest: float, pause: Callable[[], object] = int) -> Stats:
-    """What stats say of a finished run, whose last frame was a time `rest` after a step. pause : see `_uncut`."""
+def _tell(about: Stats, march: March, times: Float, rest: float, pause: Callable[[], object] = int) -> None:
+    """Add to stats what is known of a finished run, whose last frame was a time `rest` after a step. pause : see `_uncut`."""
     work = march.work
-    told: Stats = {"steps": work.taken or march.step, "gradients": work.gradients, "solves": work.solves}
-    told["unconverged"] = work.unconverged
+    about["steps"], about["gradients"], about["solves"] = work.taken or march.step, work.gradients, work.solves
+    about["unconverged"] = work.unconverged
     if work.unconverged:
-        told["short_steps"] = sum(steps_before(time, march.h)[1] > 0 for time in times.tolist())
-        told |= _uncut(march.remedy, pause)
+        about["short_steps"] = sum(steps_before(time, march.h)[1] > 0 for time in times.tolist())
+        about |= _uncut(march.remedy, pause)
     if march.watch is not None:
-        told["step_error"] = _uncut(partial(march.step_error, rest), pause)
-    return told
+        about["step_error"] = _uncut(partial(march.step_error, rest), pause)
 
 
 def _uncut(call: Callable[[], Result], pause: Callable[[], object] = int) -> Result:

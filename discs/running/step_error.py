@@ -114,7 +114,7 @@ class Watch:
     ) -> float | None:
         """The error against a run with half the step, at the positions kept and at the `last` ones; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
-        size = np.array(sizes(self.defects[: self.passed].tolist()))
+        size = summed(self.defects[: self.passed])[1]
         steps = [*self.looks.tolist(), self.steps] if self.steps else []
         for step, place in zip(steps, [*self.places, last], strict=True):
             memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), parameters)
@@ -127,24 +127,27 @@ class Watch:
 
 def estimated(seen: Float, steps: int) -> float:
     """The estimate of a run of some steps from looks (m, 2, rows) as in `Watch`."""
-    looks, worst = seen.tolist(), 0.0  # numbers, as NumPy takes longer for arrays so small
-    total, size = looks[0][0], sizes(looks)
-    for off, _ in looks[1:]:
-        total = [a + b for a, b in zip(total, off, strict=True)]
+    total, size = summed(seen)
+    worst = 0.0
     for row, most in enumerate(size):
         if total[row] > worst * most:
             worst = total[row] / most
-    return worst / len(looks) * SAFETY * (steps or 1)
+    return worst / len(seen) * SAFETY * (steps or 1)
 
 
-def sizes(looks: list[list[list[float]]]) -> list[float]:
-    """What errors are relative to, for each row, from looks as lists."""
-    size = looks[0][1]
-    for _, large in looks[1:]:
+def summed(seen: Float) -> tuple[list[float], list[float]]:
+    """For each row the sum of the defects of looks, and what errors are relative to. (As numbers: arrays so small take longer.)"""
+    (total, size), *others = seen.tolist()
+    for off, large in others:
+        total = [a + b for a, b in zip(total, off, strict=True)]
         size = list(map(max, size, large))
-    places, angles = LEAST * max(size[:2]), LEAST * max(size[2:])
-    least = places, places, angles, angles
-    return [most if most > least[row] else least[row] or 1.0 for row, most in enumerate(size)]
+    least = LEAST * max(size[0], size[1])
+    for row, most in enumerate(size):
+        if row == 2:
+            least = LEAST * max(size[2:])
+        if not most > least:
+            size[row] = least or 1.0
+    return total, size
 
 
 def advanced(

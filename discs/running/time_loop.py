@@ -110,30 +110,40 @@ class March:
     def on(self, step: int) -> None:
         """Advance towards a step, not beyond it; not at all if Ctrl-C was pressed and its handler did not raise."""
         heed_halt()
-        before, cost, watch, album, looks = self.memory, vars(self.work).copy(), self.watch, self.album, NO_LOOKS
+        before, stuck = self.memory, self.work.unconverged
         try:
-            if self.twin is None:
-                taken = self._plain()
-            else:
-                steps = min(CHUNK // self.system.n or 1, step - self.step, CHUNK if self.system.load is None else TABLED)
-                if watch is not None:
-                    steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.arguments(self.step))
-                stops = NO_STOPS if album is None else album.arguments(self.step, self.work.unconverged)
-                self.memory, tally = self.twin.march(
-                    self.system, self.parameters, before, self.step * self.h, self.h, steps, self.plan.bound, looks, stops
-                )
-                taken = self._accept(self.twin, before, tally)
-                if album is not None:
-                    album.done = tally.framed
+            taken = self._plain() if self.twin is None else self._compiled(self.twin, step - self.step)
         except Cut:  # drop this call
             self.memory = before
-            vars(self.work).update(cost)
-            if watch is not None:
-                watch.put_off(self.step)
+            if self.watch is not None:
+                self.watch.put_off(self.step)
             return
-        if self.work.unconverged > cost["unconverged"]:
-            self._remember(before, taken, cost["unconverged"])
+        if self.work.unconverged > stuck:
+            self._remember(before, taken, stuck)
         self.step += taken
+
+    def _compiled(self, twin: FixedStep, steps: int) -> int:
+        """Take at most so many steps by the compiled twin, and its frames on the way; returns how many were taken."""
+        before, watch, album, looks, stops = self.memory, self.watch, self.album, NO_LOOKS, NO_STOPS
+        steps = min(CHUNK // self.system.n or 1, steps, CHUNK if self.system.load is None else TABLED)
+        if watch is not None:
+            steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.arguments(self.step))
+        if album is not None:
+            stops = album.arguments(self.step, self.work.unconverged)
+        t, h, bound = self.step * self.h, self.h, self.plan.bound
+        self.memory, tally = twin.march(self.system, self.parameters, before, t, h, steps, bound, looks, stops)
+        if tally.lost >= 0 or tally.blown:
+            self.work.add(tally)
+            self._fail(twin, before, tally)
+        if watch is not None:
+            if watch.doubted:
+                self._compare(watch, before)
+            else:
+                watch.passed, watch.doubted = watch.passed + tally.passed, tally.doubted
+        self.work.add(tally)  # after what Ctrl-C may interrupt
+        if album is not None:
+            album.done = tally.framed
+        return tally.steps
 
     def _compare(self, watch: Watch, before: Memory) -> None:
         """Compare the last step with a more accurate one."""
@@ -189,7 +199,7 @@ class March:
                 self._remember(self.memory, 1, stuck)
             time = self.step * self.h + tau
             if self.parameters is not None and self.system.load is not None and not np.isfinite(frame.rate).all():
-                self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, Work())  # as in `_accept`
+                self.integrator.at(self.system, self.memory, self.step * self.h, tau, self.h, Work())  # as in `_fail`
             by_velocity = self.plan.explicit or self.work.unconverged > stuck
             lost = frame.lost if frame.lost >= 0 else self._lost(self.memory, frame, tau, by_velocity)
             self._check_heading(lost, self.step, time, self.memory)
@@ -249,19 +259,6 @@ class March:
             start = self.integrator.at(self.system, before, self.step * self.h, 0.0, self.h, self.work)
             lost = self.system.lost_heading(before, start._replace(hi=start.hi + h * start.rate))
         return lost
-
-    def _accept(self, twin: FixedStep, previous: Memory, tally: Tally) -> int:
-        """Count and check compiled steps from the memory `previous`; returns how many they are."""
-        watch = self.watch
-        self.work.add(tally)
-        if tally.lost >= 0 or tally.blown:
-            self._fail(twin, previous, tally)
-        if watch is not None:
-            if watch.doubted:
-                self._compare(watch, previous)
-            else:
-                watch.passed, watch.doubted = watch.passed + tally.passed, tally.doubted
-        return tally.steps
 
     def _fail(self, twin: FixedStep, previous: Memory, tally: Tally) -> None:
         """Raise the error of compiled steps from the memory `previous`, the last of which failed."""

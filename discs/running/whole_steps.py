@@ -24,9 +24,6 @@ def steps_before(time: float, h: float) -> tuple[int, float]:
 
 def all_steps_before(times: Float, h: float) -> tuple[Int, Float]:
     """The same of times (F,): (F,) each."""
-    if times.size == 1:
-        step, rest = steps_before(float(times[0]), h)
-        return np.array([step]), np.array([rest])
     steps = (times / h * UP + NEAR).astype(np.int64)
     rests: Float = times - steps * h
     rests[rests <= NEAR * h] = 0.0
