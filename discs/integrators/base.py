@@ -169,12 +169,14 @@ class FixedStep(Integrator):
             starts = t + h * np.arange(steps + 1.0)
             times = np.add.outer(starts, h * np.array([0.0, *self.parameters.nodes]))
             chain = chain._replace(load=system.load.timed(times.ravel(), abs(h)))
-        # momenta (n,) are (1, n) in compiled code
-        state = type(memory)(*[(array if array.ndim == 2 else array[None]).copy() for array in memory])
+        if flat := memory[-1].ndim == 1:  # momenta (n,) are (1, n) in compiled code
+            state = Phase(memory.hi.copy(), memory.lo.copy(), memory.pi[None].copy())
+        else:
+            state = type(memory)(*[array.copy() for array in memory])
         tally = self.steps(self.twin_of(system, chain), state, t, h, steps, bound, looks, stops, system.known)
         if system.load is not None and not system.load.conservative:
             tally = tally._replace(spent=chain.load.spent)
-        return state if memory[-1].ndim == 2 else Phase(state.hi, state.lo, state.pi[0]), tally
+        return Phase(state.hi, state.lo, state.pi[0]) if flat else state, tally
 
     @final
     def steps(

@@ -71,7 +71,6 @@ class Work:
         self.book(work, 0.0 * work)
 
 
-
 class Tally(NamedTuple):
     """The result of compiled steps.
 

@@ -41,7 +41,7 @@ class Album:
 
         The steps end when that number has doubled, so that `March` can remember where it was.
         """
-        return max(stuck, 1), first, self.done, self.steps, self.rests, self.q, self.rates, self.energy_slip
+        return stuck or 1, first, self.done, self.steps, self.rests, self.q, self.rates, self.energy_slip
 
     def write(self, found: dict[str, Any]) -> None:
         """Store the next frame, if compiled steps left it."""

@@ -19,7 +19,7 @@ from discs.running.album import Album
 from discs.running.engine import WAITING, plain_because, refuse_loads
 from discs.running.frames import ROUNDING, frame_times, observed, wanted
 from discs.running.plan import Plan, records
-from discs.running.progress import NO_BAR, Progress
+from discs.running.progress import NO_BAR, NoBar, Progress
 from discs.running.ready import kernels
 from discs.running.recording import Recording, Rows
 from discs.running.step_error import Watch
@@ -67,7 +67,7 @@ def run_once(
     if h > (1 + ROUNDING) * problem.duration and not integrator.adaptive:
         raise ValueError(f"dt must be at most the duration, {problem.duration:g}; got {h:g}")
     times = frame_times(frames, problem.duration) if checked else np.asarray(frames)
-    end = float(times[-1])
+    end = times.item(-1)
     if end / h > MOST_STEPS:
         check_steps(end, h)
     plan, there = planned(problem, integrator, asked, want, h)
@@ -77,7 +77,7 @@ def run_once(
     last, started = steps_before(end, h), clock.perf_counter()
     steps, rest = last
     watch = Watch(steps, len(plan.system.rows), plan.system.n) if checked and not integrator.adaptive else None
-    march, first = None, 0
+    march = None
     if plan.records:
         album = Album(plan.system, times, h, last)
         march = March(plan, h, watch, album)
@@ -91,22 +91,12 @@ def run_once(
         if record.complete:
             return record.solution({})
         march = march or March(plan, h, watch)
-        if checkpoint is not None:
-            first = record.begin(march, partial(observed, march, 0.0))
-        for f in range(first, times.size):
-            before, rest = steps_before(float(times[f]), h)
-            while march.step < before:
-                march.on(before)
-                if there:  # kernels overtake the run, which begins anew
-                    return run_once(problem, integrator, dt, frames, asked, checked, more, estimate)
-                shown.update(march.step)
-                record.pause(f, march)
-            pause = partial(record.pause, f, march)
-            record.write(f, _uncut(partial(observed, march, rest), pause))  # not kept in a variable: the next step needs the memory
-            record.pause(f + 1, march)
-        _tell(about, march, times, rest, partial(record.pause, times.size, march))
-        about["seconds"] = record.seconds + clock.perf_counter() - started
-        return record.solution(about, march)
+        first = 0 if checkpoint is None else record.begin(march, partial(observed, march, 0.0))
+        if _frame_by_frame(march, record, first, shown, there):
+            _tell(about, march, times, rest, partial(record.pause, times.size, march))
+            about["seconds"] = record.seconds + clock.perf_counter() - started
+            return record.solution(about, march)
+    return run_once(problem, integrator, dt, frames, asked, checked, more, estimate)
 
 
 def planned(problem: Problem, integrator: Integrator, asked: Asked, want: tuple[str, ...], h: float) -> tuple[Plan, Kernels | bool]:
@@ -148,6 +138,22 @@ def _fill(album: Album, march: March, steps: int, progress: bool) -> None:
             else:
                 march.on(steps)
                 shown.update(march.step)
+
+
+def _frame_by_frame(march: March, record: Rows, first: int, shown: Progress | NoBar, there: Kernels | bool) -> bool:
+    """Take a run from frame number `first` on; False as soon as its kernels are `there`, so that it begins anew."""
+    for f in range(first, record.times.size):
+        before, rest = steps_before(float(record.times[f]), march.h)
+        while march.step < before:
+            march.on(before)
+            if there:
+                return False
+            shown.update(march.step)
+            record.pause(f, march)
+        pause = partial(record.pause, f, march)
+        record.write(f, _uncut(partial(observed, march, rest), pause))  # not kept in a variable: the next step needs the memory
+        record.pause(f + 1, march)
+    return True
 
 
 def _tell(about: Stats, march: March, times: Float, rest: float, pause: Callable[[], object] = int) -> None:

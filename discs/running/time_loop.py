@@ -125,7 +125,8 @@ class March:
     def _compiled(self, twin: FixedStep, steps: int) -> int:
         """Take at most so many steps by the compiled twin, and its frames on the way; returns how many were taken."""
         before, watch, album, looks, stops = self.memory, self.watch, self.album, NO_LOOKS, NO_STOPS
-        steps = min(CHUNK // self.system.n or 1, steps, CHUNK if self.system.load is None else TABLED)
+        if steps * self.system.n > CHUNK or steps > TABLED:
+            steps = min(CHUNK // self.system.n or 1, steps, CHUNK if self.system.load is None else TABLED)
         if watch is not None:
             steps, looks = (1, NO_LOOKS) if watch.doubted else (steps, watch.arguments(self.step))
         if album is not None:
