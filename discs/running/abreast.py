@@ -99,7 +99,7 @@ def side_by_side(problems: Sequence[Problem], integrator: FixedStep, h: float, t
     looked = np.moveaxis(defects.reshape(len(padded), watch.looks.size, 2, rows, LANES), -1, 1).reshape(
         -1, *defects.shape[1:3], rows
     )
-    errors = np.array([estimated(seen, last) for seen in looked[:count]]) if checked else np.zeros(count)
+    errors = np.array([estimated(seen, last)[0] for seen in looked[:count]]) if checked else np.zeros(count)
 
     def by_chain(values: Float) -> Float:
         """(bundles, F, n LANES) as (B, F, n)."""

@@ -105,16 +105,15 @@ class Watch:
 
     def estimate(self) -> float:
         """The estimate from the looks done so far."""
-        if self.passed == self.looks.size:
-            return estimated(self.defects, self.steps)
-        return estimated(self.defects[: self.passed], self.steps) if self.passed else 0.0
+        seen = self.defects if self.passed == len(self.defects) else self.defects[: self.passed]
+        return estimated(seen, self.steps)[0] if self.passed else 0.0
 
     def again(
         self, system: RollingDiscs, start: Phase, integrator: FixedStep, last: Float, h: float, parameters: Parameters
     ) -> float | None:
         """The error against a run with half the step, at the positions kept and at the `last` ones; None if that run fails."""
         done, worst, memory = 0, 0.0, integrator.begin(system, start, 0.5 * h, Work(), parameters)
-        size = summed(self.defects[: self.passed])[1]
+        _, size = estimated(self.defects[: self.passed], self.steps)
         steps = [*self.looks.tolist(), self.steps] if self.steps else []
         for step, place in zip(steps, [*self.places, last], strict=True):
             memory, tally = advanced(system, integrator, memory, done * h, 0.5 * h, 2 * (step - done), parameters)
@@ -125,29 +124,21 @@ class Watch:
         return 4 / 3 * worst
 
 
-def estimated(seen: Float, steps: int) -> float:
-    """The estimate of a run of some steps from looks (m, 2, rows) as in `Watch`."""
-    total, size = summed(seen)
-    worst = 0.0
-    for row, most in enumerate(size):
-        if total[row] > worst * most:
-            worst = total[row] / most
-    return worst / len(seen) * SAFETY * (steps or 1)
-
-
-def summed(seen: Float) -> tuple[list[float], list[float]]:
-    """For each row the sum of the defects of looks, and what errors are relative to. (As numbers: arrays so small take longer.)"""
-    (total, size), *others = seen.tolist()
+def estimated(seen: Float, steps: int) -> tuple[float, list[float]]:
+    """The estimate of a run of some steps from looks (m, 2, rows) as in `Watch`, and what errors of each row are relative to."""
+    (total, size), *others = seen.tolist()  # numbers, as NumPy takes longer for arrays so small
     for off, large in others:
         total = [a + b for a, b in zip(total, off, strict=True)]
         size = list(map(max, size, large))
-    least = LEAST * max(size[0], size[1])
+    worst, least = 0.0, LEAST * max(size[0], size[1])
     for row, most in enumerate(size):
         if row == 2:
             least = LEAST * max(size[2:])
         if not most > least:
-            size[row] = least or 1.0
-    return total, size
+            size[row] = most = least or 1.0
+        if total[row] > worst * most:
+            worst = total[row] / most
+    return worst / len(seen) * SAFETY * (steps or 1), size
 
 
 def advanced(
