@@ -96,10 +96,10 @@ def side_by_side(problems: Sequence[Problem], integrator: FixedStep, h: float, t
     for m, bundle in enumerate(bundles(starts.parameters, starts.chains[padded], bounds[padded])):
         stops = steps, rests, recorded[m], rates[m], energy_slip[m]
         clean[m] = advance(integrator, bundle, Phases(hi[m], lo.copy(), momenta[m]), h, watch, defects[m], stops, work[m])
-    looked = np.moveaxis(defects.reshape(len(padded), watch.looks.size, 2, rows, LANES), -1, 1).reshape(
-        -1, *defects.shape[1:3], rows
-    )
-    errors = np.array([estimated(seen, last)[0] for seen in looked[:count]]) if checked else np.zeros(count)
+    errors = np.zeros(count)
+    if checked:
+        looked = np.moveaxis(defects.reshape(*defects.shape[:3], rows, LANES), -1, 1).reshape(-1, *defects.shape[1:3], rows)
+        errors[:] = [estimated(seen, last)[0] for seen in looked[:count]]
 
     def by_chain(values: Float) -> Float:
         """(bundles, F, n LANES) as (B, F, n)."""
