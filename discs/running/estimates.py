@@ -15,7 +15,8 @@ LEAST_ORDER = 0.5  # lower bound of an observed order; an error of this order or
 MOST_ORDER = 2.0  # upper bound of an order in an estimate; higher orders vary from run to run
 SAFETY = 1.5  # factor of estimates
 ROUNDED = 1e-12  # a quantity below it, in units of its scale, is rounding only
-SWEPT = 0.03  # part of a tolerance that sweeps may leave as an error
+SWEPT = 0.1  # part of a tolerance that sweeps may leave as an error ...
+FIRST_SWEPT = 0.03  # ... in the first run: quantities may turn out to be smaller than one
 LEFT = 0.5  # error that the sweeps of a step leave, in units of their tolerance; measured: at most 0.4 (rings), mostly 0.04
 LEFT_RATE = 10.0  # the same of a rate, in units of their tolerance over the step
 LEAST_SWEPT = 1e-16  # least tolerance of sweeps: rounding
@@ -107,10 +108,10 @@ def left(system: SkewGradient, dt: float, end: float) -> dict[str, float]:
 
 
 def sweeps_to(problem: Problem, bound: Mapping[str, float], size: Mapping[str, float], dt: float, end: float) -> float:
-    """The tolerance of sweeps that leaves errors of at most SWEPT times the tolerances `bound`."""
+    """The tolerance of sweeps that leaves errors of at most a part of the tolerances `bound`; less while sizes are unknown ({})."""
     most = left(problem.system, dt, end)
     parts = [tol * size.get(name, 1.0) / most.get(name, LEFT_RATE * end / dt) for name, tol in bound.items()]
-    return max(SWEPT * min(parts), LEAST_SWEPT)
+    return max((SWEPT if size else FIRST_SWEPT) * min(parts), LEAST_SWEPT)
 
 
 def nudged(problem: Problem) -> Problem:

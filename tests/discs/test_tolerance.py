@@ -43,7 +43,7 @@ def test_the_true_error_is_within_the_tolerance(problem, tol):
     run = simulate(problem, "auto", tol=tol, frames=12, progress=False)
     assert true_error(problem, run) <= tol
     loose = 3e-3 if problem.chain.n == 33 else 3e-4  # own headings gain nothing by the midpoint method at 1e-3
-    implicit = "midpoint" if tol >= loose else "gauss6"
+    implicit = "midpoint" if tol >= loose else "gauss6" if tol > 1e-6 else "gauss8"
     assert run.stats["method"] in (implicit, "DOP853" if problem.chain.n == 33 else implicit)
     assert run.stats["attempts"] >= 2
     assert run.stats["dt"] > 0
@@ -141,7 +141,7 @@ def test_without_any_setting_a_run_is_to_a_thousandth():
 
 
 def test_where_a_thousandth_is_out_of_reach_that_is_a_warning(monkeypatch):
-    monkeypatch.setattr("discs.running.tolerance.ATTEMPTS", 5)
+    monkeypatch.setattr("discs.running.tolerance.ATTEMPTS", 4)
     problem = lump(untwisting_rod(twist=3.0), 33, "consistent")
     with pytest.warns(UserWarning, match=r"tol = 0.001 was not reached: the error is estimated at .*: this is the last run"):
         run = simulate(problem, progress=False)
@@ -191,7 +191,7 @@ def test_runs_with_steps_that_did_not_converge_are_never_taken():
 def test_an_estimate_is_a_few_times_the_error():
     """Two methods, from smooth motions to stiff ones: the run is the one whose error the last run measured."""
     smooth, stiff = lump(breathing_ring(duration=2.0), 40), lump(steered_rod(10.0, 10.0, 0.05), 33)
-    for problem, tol in [(smooth, 1e-8), (stiff, 1e-3), (stiff, 1e-6), (lump(untwisting_rod(), 65), 1e-5)]:
+    for problem, tol in [(smooth, 1e-10), (stiff, 1e-3), (stiff, 1e-6), (lump(untwisting_rod(), 65), 1e-5)]:
         run = simulate(problem, "auto", tol=tol, frames=6, progress=False)
         exact = simulate(problem, Gauss8(tolerance=1e-14), run.stats["dt"] / 8, run.t, progress=False)
         parts = [(run.error_estimate[row], getattr(run, row), getattr(exact, row)) for row in problem.system.rows]
