@@ -156,7 +156,7 @@ def search(
         quantities named.
     times : frames, (F,).
     want : further quantities to record.
-    coarse : choose steps and tolerances of sweeps from a few, the next ones that are not larger.
+    coarse : choose steps and tolerances of sweeps from a few, the next ones that are not larger; begin with FEWEST steps.
     explicit : "auto" may try "DOP853" first.
 
     Returns
@@ -183,7 +183,7 @@ def search(
         if fitting is not None:
             return _with_search(fitting, known, tol, made, "fewest steps" if made == 2 else "tolerance")
     rows = len(problem.system.rows)
-    steps = _one_of_a_few(first_steps(problem, integrator, least_tol, end), coarse)
+    steps = FEWEST if coarse else first_steps(problem, integrator, least_tol, end)
     runs: list[Solution] = []  # of one method, at most three, with shorter and shorter steps
     sweeps: dict[float, Integrator] = {}  # the method with its tolerance of sweeps, by the step of a run
     size: dict[str, float] = {}

@@ -54,7 +54,7 @@ def test_a_tolerance_below_the_rounding_of_sweeps_is_refused_at_once():
     """Few discs hardly see a narrow bump: theta is so small that rounding exceeds its tolerance."""
     problem, tol, _ = random_problem(7, 491)
     with pytest.raises(NotReached, match="so rounding is the limit") as caught:
-        simulate(problem, "auto", tol=tol, frames=3, progress=False)
+        simulate(problem, "auto", tol=tol, frames=3, want=("slope",), progress=False)  # not by DOP853
     assert caught.value.best.stats["steps"] < 5000
 
 

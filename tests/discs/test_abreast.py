@@ -151,7 +151,7 @@ def test_each_run_keeps_its_tolerance(how, kernels_as_python, noted):
             assert np.abs(getattr(run, name) - getattr(exact, name)).max() <= run.error_estimate[name] <= tol * size
         assert run.stats["tol"] == how["tol"]
         assert abs(run.stats["attempts"] - alone.stats["attempts"]) <= 2
-        assert 0.8 < alone.stats["dt"] / run.stats["dt"] < 2
+        assert 0.5 < alone.stats["dt"] / run.stats["dt"] < 2  # alone the first number of steps is guessed from the chain
 
 
 @pytest.mark.long  # compiles for 20 s
