@@ -144,6 +144,8 @@ class FixedStep(Integrator):
         lanes = system.lanes if self.in_lanes else None
         if lanes is None:
             return chain
+        if system.load is None:
+            return lanes
         timed = chain.load
         return lanes._replace(load=lanes.load._replace(times=timed.times, values=timed.values, near=timed.near, spent=timed.spent))
 
