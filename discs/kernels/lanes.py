@@ -156,9 +156,9 @@ def join(order, ring, x):
         store(x, LANES * k, before(load(x, LANES * (order.rows + k))))
         store(x, end + LANES * k, after(load(x, HALO + LANES * k)))
         x[LANES * k], x[end + LANES * (k + 1) - 1] = 0.0, 0.0
-        if ring:  # the two entries before disc 0 too
-            x[LANES * (order.first + k)] = x[LANES * (order.rows + k) + LANES - 1]
-            x[end + LANES * (k + 1) - 1] = x[HALO + order.places[k]]
+    for k in range(2 * ring):  # the two entries before disc 0 too, which may be in the rows above
+        x[LANES * (order.first + k)] = x[LANES * (order.rows + k) + LANES - 1]
+        x[end + LANES * (k + 1) - 1] = x[HALO + order.places[k]]
 
 
 @fill(orders.wrap, Order)

@@ -22,7 +22,7 @@ from tests.discs.test_simulate import collapsing
 
 pytestmark = pytest.mark.slow
 
-SIZES = [64, 65, 66, 70, 72, 73, 129]  # with 0, 7, 6, 2, 0, 7, 7 entries without a disc
+SIZES = [*range(64, 74), 129]  # with 0, 7, 6, ... 0, 7 entries without a disc
 
 
 def formula(a, b, out):

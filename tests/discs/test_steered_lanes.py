@@ -23,7 +23,7 @@ from tests.discs.test_lanes import apart
 pytestmark = pytest.mark.slow
 
 ROWS = "x", "y", "theta", "phi", "omega", "phi_rate", "energy"
-SIZES = [64, 65, 73, 130]  # with 0, 7, 7, 6 entries without a disc
+SIZES = [*range(64, 74), 130]  # with 0, 7, 6, ... 0, 7, 6 entries without a disc
 
 
 def factor_and_solve(order, ring, m, b):
