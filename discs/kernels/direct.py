@@ -11,6 +11,8 @@ from typing import Any
 
 Known = dict[Callable[..., Any], tuple[Any, Any, Callable[..., Any]]]
 
+_CODES: dict[Any, Callable[..., Any] | None] = {}  # of numba's dispatchers that have one form
+
 
 def direct(known: Known, kernel: Callable[..., Any], method: Any, chain: Any) -> Callable[..., Any]:
     """The machine code of a kernel for a method and a chain or, until it was called with them, what calls the kernel.
@@ -41,5 +43,8 @@ def machine_code(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Call
     """The machine code that a kernel just called for these arguments; None if it is plain Python or if there may be several."""
     kinds = tuple(map(type, (*arguments, *arguments[0], *arguments[1])))
     made: Any = getattr(kernel, "known", {}).get(kinds)
-    forms = list(getattr(made, "overloads", {}).values())
-    return getattr(forms[0], "entry_point", None) if len(forms) == 1 else None
+    if len(getattr(made, "overloads", ())) != 1:
+        return None
+    if made not in _CODES:  # to look it up in `overloads` takes 40 microseconds
+        _CODES[made] = getattr(next(iter(made.overloads.values())), "entry_point", None)
+    return _CODES[made]
