@@ -31,7 +31,7 @@ class Album:
             checks.fits(f"frames = {count}", (2 * rows * n + 2) * count)
         self.system, self.times, self.done = system, np.ascontiguousarray(times), 0
         if count == 1 and last is not None:
-            self.steps, self.rests = np.array([last[0]]), np.array([last[1]])
+            self.steps, self.rests = np.array([last[0]], np.int64), np.array([last[1]])
         else:
             self.steps, self.rests = all_steps_before(times, h)
         self.q, self.rates, self.energy_slip = np.empty((rows, count, n)), np.empty((rows - 2, count, n)), np.empty((2, count))

@@ -96,7 +96,7 @@ def run_once(
             _tell(about, march, times, rest, partial(record.pause, times.size, march))
             about["seconds"] = record.seconds + clock.perf_counter() - started
             return record.solution(about, march)
-    return run_once(problem, integrator, dt, frames, asked, checked, more, estimate)
+    return run_once(problem, integrator, dt, frames, asked, checked, more, estimate)  # overtaken by its kernels
 
 
 def planned(problem: Problem, integrator: Integrator, asked: Asked, want: tuple[str, ...], h: float) -> tuple[Plan, Kernels | bool]:
