@@ -68,6 +68,7 @@ def add_run_options(p: argparse.ArgumentParser) -> None:
     add_loads(p)
     said = "compiled; plain, NumPy and SciPy; ready, compiled if kernels are there; auto, which also compiles them (default: auto)"
     p.add_argument("--engine", choices=ENGINES, help=said)
+    p.add_argument("--threads", metavar="N", type=int, default=1, help="cores for one chain of thousands of discs (default: 1)")
     add_saving(p)
 
 
@@ -138,6 +139,7 @@ def run_discs(problem: Problem, options: argparse.Namespace) -> None:
         frames=options.frames,
         want=options.want,
         engine=options.engine,
+        threads=options.threads,
         progress=not options.quiet,
         checkpoint=options.save if streams else None,
     )

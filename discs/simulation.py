@@ -10,6 +10,7 @@ from discs import checks
 from discs.arrays import Float
 from discs.integrators import Integrator, find, from_settings
 from discs.kernels.background import usual
+from discs.kernels.teams import using
 from discs.linkage import LinkageProblem
 from discs.linkage.motion import run as linkage_run
 from discs.problem import Problem
@@ -38,6 +39,7 @@ def simulate(
     tol: float | Mapping[str, float] | None = None,
     checkpoint: str | Path | None = None,
     events: Event | Sequence[Event] = (),
+    threads: int = 1,
 ) -> Solution:
     """Run a problem.
 
@@ -68,6 +70,8 @@ def simulate(
     events : functions of a `discs.events.Moment` that are zero when something happens, own ones or those of `discs.events`;
         `run.events` tells when. One with `terminal = True` ends the run there. They need a method with fixed steps; "auto" is then
         "gauss6". The run is first done step by step to find them, see `discs.running.moments`.
+    threads : processor cores for one chain, if they have nothing else to do; it pays from 4000 discs on (docs/performance.md). For
+        chains that run in lanes, `stats["threads"]` tells how many. Results depend on it by rounding. "auto" is then "compiled".
 
     Returns
     -------
@@ -89,6 +93,10 @@ def simulate(
             return linkage_run(problem, method, dt, frames, want, progress, tol)
         raise ValueError(f"simulate takes a Problem, as `compare.lump(scene, n)` makes; got {type(problem).__name__}")
     engine, nothing = usual() if engine is None else engine, method is None and dt is None
+    if type(threads) is not int or threads != 1:
+        engine = "compiled" if engine == "auto" else engine
+        with using(checks.whole("threads", threads, 1)):
+            return simulate(problem, method, dt, frames, want, progress, engine, tol, checkpoint, events)
     if checkpoint is not None:
         checkpoint = checks.path("checkpoint", checkpoint)
     if method is not None and (type(method) is not str or not method):

@@ -20,6 +20,7 @@ class Stats(TypedDict, total=False):
     settings: str  # the integrator with all its settings, as Python writes it
     engine: str  # "compiled" or "plain"
     plain_because: str  # why it is "plain"
+    threads: int  # of its steps, if there is more than one
     want: list[str]
     dt: float  # time step; of adaptive methods the longest
     dt_suggested: bool  # whether dt was chosen by `suggest_dt`
@@ -52,8 +53,11 @@ class Stats(TypedDict, total=False):
     linkage: bool  # whether it is the run of a linkage
 
 
-def begun(integrator: Integrator, because: str, want: Sequence[str], dt: float, suggested: bool) -> Stats:
-    """The entries of stats that are known at the start of a run. because : why it is plain; empty if it is compiled."""
+def begun(integrator: Integrator, because: str, want: Sequence[str], dt: float, suggested: bool, threads: int = 1) -> Stats:
+    """The entries of stats that are known at the start of a run. because : why it is plain; empty if it is compiled.
+
+    threads : of its steps, if it is compiled.
+    """
     found: Stats = {
         "method": integrator.name,
         "order": integrator.order,
@@ -65,6 +69,8 @@ def begun(integrator: Integrator, because: str, want: Sequence[str], dt: float, 
     }
     if because:
         found["plain_because"] = because
+    elif threads > 1:
+        found["threads"] = threads
     return found
 
 

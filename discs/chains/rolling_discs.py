@@ -66,6 +66,22 @@ class RollingDiscs(SkewGradient):
     vanishing: bool
     stiffest: float
 
+    def parts(self, count: int) -> tuple[Parameters, ...]:
+        """The parameters in lanes for each of several threads, where there are `lanes`."""
+        from discs.kernels import parts  # numba is slow to import
+
+        if count not in self._parts:
+            self._parts[count] = tuple(self.part(own) for own in parts.parts(self.n, count))
+        return self._parts[count]
+
+    @cached_property
+    def _parts(self) -> dict[int, tuple[Parameters, ...]]:
+        return {}
+
+    @abstractmethod
+    def part(self, own: Parameters) -> Parameters:
+        """The parameters in lanes of the discs of one thread, in the order `own`, a `discs.kernels.parts.Part`."""
+
     @cached_property
     def rates(self) -> tuple[str, ...]:
         """Names of the rates of `rows`."""

@@ -176,3 +176,8 @@ class SlavedSystem(RollingDiscs):
 
         fit = slaved_lanes.MANY <= self.n <= slaved_lanes.MOST and lanes.local(self.parameters.load)
         return slaved_lanes.arranged(self.parameters) if fit else None
+
+    def part(self, own: Parameters) -> Parameters:
+        from discs.kernels import slaved_lanes
+
+        return slaved_lanes.arranged(self.parameters, own)

@@ -275,3 +275,8 @@ class SteeredSystem(RollingDiscs):
 
         fit = steered_lanes.MANY <= self.n <= steered_lanes.MOST and lanes.local(self.parameters.load)
         return steered_lanes.arranged(self.parameters) if fit else None
+
+    def part(self, own: Parameters) -> Parameters:
+        from discs.kernels import steered_lanes
+
+        return steered_lanes.arranged(self.parameters, own)

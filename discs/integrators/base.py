@@ -12,6 +12,7 @@ from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.work import NO_LOOKS, NO_STOPS, NOTHING, Cut, Frame, Looks, Memory, Stops, Tally, Work
 from discs.kernels import driver
 from discs.kernels.direct import Known, direct
+from discs.kernels import teams
 from discs.skew import Parameters, Phase
 
 
@@ -93,6 +94,10 @@ class Integrator(ABC):
         """
         return None
 
+    def threads(self, system: RollingDiscs) -> int:
+        """The number of threads of compiled steps: as asked for (`discs.kernels.teams.using`), for chains in lanes."""
+        return 1
+
     def finer(self, system: RollingDiscs, memory: Memory, t: float, h: float, chain: Parameters = None) -> Float | None:
         """Positions (rows, n) one step h later with an error several times smaller, for `discs.running.step_error`.
 
@@ -139,15 +144,20 @@ class FixedStep(Integrator):
         return self.parameters is not None
 
     @final
+    def threads(self, system: RollingDiscs) -> int:
+        return teams.threads(system.n) if self.in_lanes and system.lanes is not None else 1
+
+    @final
     def twin_of(self, system: RollingDiscs, chain: Parameters) -> Parameters:
         """What the compiled twin is given for `system.parameters`: those in lanes, if it takes them and there are."""
         lanes = system.lanes if self.in_lanes else None
         if lanes is None:
             return chain
-        if system.load is None:
-            return lanes
-        timed = chain.load
-        return lanes._replace(load=lanes.load._replace(times=timed.times, values=timed.values, near=timed.near, spent=timed.spent))
+        timed = {} if system.load is None else {name: getattr(chain.load, name) for name in ("times", "values", "near", "spent")}
+        if (count := self.threads(system)) > 1:
+            parts = system.parts(count)
+            return teams.Team(tuple(part._replace(load=part.load._replace(**timed)) for part in parts), chain.load.spent)
+        return lanes._replace(load=lanes.load._replace(**timed)) if timed else lanes
 
     @final
     def march(
@@ -197,9 +207,12 @@ class FixedStep(Integrator):
 
         known : that of the chain's `RollingDiscs`; None for chains side by side.
         """
-        own = self.parameters
-        call = driver.march if known is None else direct(known, driver.march, own, chain)
-        tally = Tally(*call(own, chain, state, t, h, steps, bound, *looks, *stops))
+        own, arguments = self.parameters, (chain, state, t, h, steps, bound, *looks, *stops)
+        if isinstance(chain, teams.Team):
+            tally = Tally(*teams.march(driver.march, own, *arguments))
+        else:
+            call = driver.march if known is None else direct(known, driver.march, own, chain)
+            tally = Tally(*call(own, *arguments))
         if tally.steps < 0:
             signal.raise_signal(signal.SIGINT)
             raise Cut

@@ -8,7 +8,6 @@ from discs.arrays import Complex, Float
 from discs.integrators.tableaux import Tableau
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill, part
-from discs.kernels.interrupts import interrupted
 from discs.kernels.shared import add as advance
 from discs.kernels.shared import column, copy, forward, largest, renew, stuck, unsettled
 from discs.skew import Phase
@@ -222,7 +221,7 @@ def collocate(method: Collocation, chain: Any, work: Any, room: Room, before: Ph
     do.begin(chain, work, method, room, before, h)
     sweep, moved = 0, np.inf
     while unsettled(method, sweep, moved):
-        if interrupted(moves.size):
+        if do.halted(chain, moves.size):
             return CUT
         moved = do.refine(chain, work, method, room, before, h, sweep)
         sweep += 1

@@ -12,7 +12,6 @@ from discs.integrators.base import OneStep
 from discs.integrators.work import Work
 from discs.kernels import protocol as do
 from discs.kernels.compiled import CUT, Cost, fill
-from discs.kernels.interrupts import interrupted
 from discs.kernels.shared import copy, forward, reach, stuck, unsettled
 from discs.skew import Phase, SkewGradient, add
 
@@ -141,7 +140,7 @@ def _step(method: Composed, chain: Any, work: Any, room: Room, before: Phase, af
         forward(work.c, p, move, 0.5 * tau)
         sweep, change = 0, np.inf
         while unsettled(method, sweep, change):
-            if interrupted(move.size):
+            if do.halted(chain, move.size):
                 return CUT
             change = do.sweep(chain, work, now, time, tau, p, move, sweep == 0)
             sweep += 1

@@ -30,6 +30,7 @@ class Abreast(NamedTuple):
     rows: int
     first: int
     ring: bool
+    disc: int = 0
 
 
 class Bands(NamedTuple):
@@ -61,8 +62,8 @@ def _pick(m, j):
 
 
 @fill(orders.previous, Abreast)
-def _previous(order, v):
-    return v
+def _previous(order, v, w):
+    return v, w
 
 
 @fill(orders.present, Abreast)
@@ -87,20 +88,25 @@ def _record(order, state, v, energy, slip, spare, q, rates, told):
 @fill(orders.join, Abreast)
 def _join(order, ring, x):
     end = HALO + LANES * order.rows
-    for k in range(2):
-        store(x, LANES * k, load(x, LANES * (order.rows + k)) if ring else zero())
-        store(x, end + LANES * k, load(x, HALO + LANES * k) if ring else zero())
+    for row in range(x.shape[0]):
+        to = x[row]
+        for k in range(2):
+            store(to, LANES * k, load(to, LANES * (order.rows + k)) if ring else zero())
+            store(to, end + LANES * k, load(to, HALO + LANES * k) if ring else zero())
 
 
 @fill(orders.wrap, Abreast)
 def _wrap(order, x):
-    for k in range(2):
-        store(x, LANES * (order.rows + k), load(x, LANES * k))
+    for row in range(x.shape[0]):
+        to = x[row]
+        for k in range(2):
+            store(to, LANES * (order.rows + k), load(to, LANES * k))
 
 
 @fill(orders.first_links, Abreast)
 def _first_links(order, ring, shift, x, e, to):
-    store(to, HALO, load(to, HALO) + load(shift, 0) if ring else zero())
+    for row in range(x.shape[0]):
+        store(to[row], HALO, load(to[row], HALO) + load(shift[row], 0) if ring else zero())
 
 
 @fill(orders.rejoin, Abreast)
@@ -111,14 +117,16 @@ def _rejoin(order, base, move, to):
 @fill(orders.close_links, Abreast)
 def _close_links(order, ends, x):
     first, last, end = HALO, HALO + LANES * (order.rows - 1), HALO + LANES * order.rows
-    if ends == RING:
-        store(x, end, load(x, first))
-    elif ends == GHOST:
-        for at, to in ((first, LANES), (end, -LANES)):
-            store(x, at, 3.0 * (load(x, at + to) - load(x, at + 2 * to)) + load(x, at + 3 * to))
-    else:
-        store(x, first, 2.0 * load(x, first + LANES) - load(x, first + 2 * LANES))
-        store(x, end, 2.0 * load(x, last) - load(x, last - LANES))
+    for axis in range(2):
+        to = x[axis]
+        if ends == RING:
+            store(to, end, load(to, first))
+        elif ends == GHOST:
+            for at, way in ((first, LANES), (end, -LANES)):
+                store(to, at, 3.0 * (load(to, at + way) - load(to, at + 2 * way)) + load(to, at + 3 * way))
+        else:
+            store(to, first, 2.0 * load(to, first + LANES) - load(to, first + 2 * LANES))
+            store(to, end, 2.0 * load(to, last) - load(to, last - LANES))
 
 
 @fill(orders.pull_ends, Abreast)

@@ -8,7 +8,6 @@ import numpy as np
 
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, kernel, part, stub
-from discs.kernels.interrupts import interrupted
 from discs.kernels.limits import TURNED
 from discs.kernels.shared import ahead, columns, disc_by_disc, forward, seen
 from discs.skew import Phase
@@ -71,7 +70,7 @@ def march(
         framing = framed < stops.size and stops[framed] - since == step
         if step == steps and not framing:
             break
-        if step % POLLED == 0 and interrupted(POLLED * rows * n):
+        if step % POLLED == 0 and do.halted(chain, POLLED * rows * n):
             return -1, gradients, solves, unconverged, -1, passed, doubted, False, framed
         size = rests[framed] if framing else h
         if do.vanishing(chain) and do.jumps(method):
@@ -161,6 +160,7 @@ def _judge(chain, start, end, place, defect):
             j = do.place(chain, i)
             off, size, turned = max(off, abs(to[i])), max(size, abs(after[j])), max(turned, abs(after[j] - before[j]))
             to[i] = after[j]
+        off, size, turned = do.most(chain, off), do.most(chain, size), do.most(chain, turned)
         defect[0, row], defect[1, row] = off / 12, size
         worst = np.inf if row == 3 and turned > TURNED else max(worst, defect[0, row] / (size if size > 0 else 1.0))
     return worst

@@ -1,18 +1,11 @@
-r"""One chain in lanes: its discs cut into LANES segments of equal length, which fill the lanes of `discs.kernels.vectors`.
+"""One chain in lanes: its discs cut into LANES segments of equal length, which fill the lanes of `discs.kernels.vectors`.
 
 A recurrence along a chain waits for itself at every disc; eight segments side by side wait once for eight discs.
 
 Order. With `rows` discs to a segment, disc i is at j = i + first: row j % rows of lane j // rows, entry `places` of an array (n',),
 n' = LANES rows >= n. The first entries of lane 0, `first` = n' - n of them, belong to no disc; they do not move. Arrays with two
-more rows at both ends, (n' + 2 HALO,), hold in them the neighbours of each lane, see `join`.
-
-Linear system. The last two rows of each segment separate it from the next one. The others are eliminated downwards, all lanes at
-once: row i has couplings u to row i + 1, w to row i + 2, and p, q to the two separators before its segment (to begin with only rows
-0 and 1). That leaves the separators, a block tridiagonal system of eight 2 x 2 blocks, closed around a ring (a Schur complement):
-
-    D_l -> D_l - sum over rows of l + 1 of (p, q)^T (p, q)/a,   K_l = the couplings p, q of the separators of l to those of l - 1,
-
-which `discs.kernels.blocks` solves. Corners of consistent ends are eliminated before all else, with the end discs.
+more rows at both ends, (n' + 2 HALO,), hold in them the neighbours of each lane, see `orders.join`. The last rows of each lane
+separate it from the next one; what links them is a small system of its own (`discs.kernels.elimination`).
 """
 
 from typing import NamedTuple
@@ -29,34 +22,28 @@ from discs.kernels.vectors import LANES, after, before, largest, load, store, to
 from discs.skew import Phase
 
 HALO = 2 * LANES
-LEAD = LANES + 1  # rows that may be coupled around a ring
 
 
 class Order(NamedTuple):
-    """The order of n discs in lanes. places : (n,), the entries of the discs. inner : (LANES,), 1 but 0 in the first lane."""
+    """The order of n discs in lanes. places : (n,), the entries of the discs. inner : (LANES,), 1 but 0 in the first lane.
+
+    left, right : the ends of the chain that it has, range(left, right), of 0 and 1. disc : 0, the first disc.
+    """
 
     n: int
     rows: int
     first: int
     places: NDArray
     inner: NDArray
+    left: int = 0
+    right: int = 2
+    disc: int = 0
 
 
-class Matrix(NamedTuple):
-    """A factored matrix, real or complex, (n',) in lanes: 1/a, u/a, w/a, p/a, q/a.
+class Separators(NamedTuple):
+    """The system of the separators: d (3, L), o (4, L) as in `discs.kernels.blocks`, columns (2, 2, L), edge (11,) as in
+    `discs.kernels.steered_matrix`. rest : (2, L), its right side. L is LANES for each thread."""
 
-    lead : (2, LANES LEAD), couplings around a ring, 0 elsewhere. corner : (2,). ends : (2, 4), multipliers and reciprocal pivots of
-    the end discs. d, o, columns, edge : of the separators, see `discs.kernels.steered_matrix`. rest : (2, LANES), their right side.
-    """
-
-    a: NDArray
-    u: NDArray
-    w: NDArray
-    p: NDArray
-    q: NDArray
-    lead: NDArray
-    corner: NDArray
-    ends: NDArray
     d: NDArray
     o: NDArray
     columns: NDArray
@@ -78,16 +65,23 @@ def local(load):
     return type(load) is Linear and load.viscosity.size == load.bends.rest.size == load.axles.size == 0
 
 
+def put(order, values, rest=0.0, halo=0, ring=False):
+    """Values (..., n) of the discs of a whole chain in lanes, (..., n' + 2 halo), and `rest` elsewhere."""
+    n, rows, more = values.shape[-1], order.rows, halo // LANES
+    row, lane = np.divmod(np.arange(LANES * (rows + 2 * more)), LANES)
+    disc = order.disc + rows * lane + row - more - order.first
+    there = (disc >= (-more if ring else 0)) & (disc < (n + more if ring else n))
+    return np.ascontiguousarray(np.where(there, values[..., disc % n], rest))
+
+
 def loaded(order, load):
     """The parameters of a load that is `local`, in lanes: arrays (..., n')."""
 
-    def put(values):
-        to = np.zeros((*values.shape[:-1], LANES * order.rows * (values.size > 0)))
-        if values.size > 0:
-            to[..., order.places] = values
-        return to
+    def of_discs(values):
+        return put(order, values) if values.size > 0 else np.zeros((*values.shape[:-1], 0))
 
-    return load._replace(**{name: put(getattr(load, name)) for name in ("constant", "damping", "stiffness", "patterns")})
+    own = {name: of_discs(getattr(load, name)) for name in ("constant", "damping", "stiffness", "patterns")}
+    return load._replace(**own, spent=np.zeros_like(load.spent))
 
 
 # Forms of `discs.kernels.protocol` for chains in this order
@@ -112,177 +106,111 @@ def leave(chain, own, state):
         disc_by_disc(chain, array, to)
 
 
-@fill(orders.matrices, Order, _nrt=True)
-def matrices(order, g, count):
-    n, kind = LANES * order.rows, np.array([g]).dtype
-    a, u, w, p, q = np.zeros((5, count, n), kind)
-    lead, corner, ends = np.zeros((count, 2, LANES * LEAD), kind), np.zeros((count, 2), kind), np.zeros((count, 2, 4), kind)
-    d, o, rest = np.zeros((count, 3, LANES), kind), np.zeros((count, 4, LANES), kind), np.zeros((count, 2, LANES), kind)
-    columns, edge = np.zeros((count, 2, 2, LANES), kind), np.zeros((count, 11), kind)
-    return Matrix(a, u, w, p, q, lead, corner, ends, d, o, columns, edge, rest)
+@part(_nrt=True)
+def tied(n, g, count):
+    """Workspace for `count` systems of n separators."""
+    kind = np.array([g]).dtype
+    d, o, columns = np.zeros((count, 3, n), kind), np.zeros((count, 4, n), kind), np.zeros((count, 2, 2, n), kind)
+    return Separators(d, o, columns, np.zeros((count, 11), kind), np.zeros((count, 2, n), kind))
 
 
-@fill(orders.pick, Matrix)
-def pick(m, j):
-    lead, corner, ends, d, o, columns, edge = m.lead[j], m.corner[j], m.ends[j], m.d[j], m.o[j], m.columns[j], m.edge[j]
-    return Matrix(m.a[j], m.u[j], m.w[j], m.p[j], m.q[j], lead, corner, ends, d, o, columns, edge, m.rest[j])
+@fill(orders.separators, Order, _nrt=True)
+def _separators(order, g, count):
+    return tied(LANES, g, count)
+
+
+@fill(orders.pick, Separators)
+def _pick(m, j):
+    return Separators(m.d[j], m.o[j], m.columns[j], m.edge[j], m.rest[j])
 
 
 @fill(orders.present, Order)
-def _present(order, i):
+def present(order, i):
     return load(order.inner, 0) if i < LANES * order.first else 1.0 + zero()
 
 
 @fill(orders.record, Order)
-def _record(order, state, v, energy, slip, spare, q, rates, told):
+def record(order, state, v, energy, slip, spare, q, rates, told):
     for i in range(order.n):
         j = order.places[i]
         for row in range(q.shape[0]):
             q[row, i] = state.hi[row, j] + state.lo[row, j]
         for row in range(rates.shape[0]):
             rates[row, i] = v[row + 2, j]
-    told[0], told[1] = total(energy, spare), largest(slip, spare)
+    told[0], told[1] = orders.added(order, total(energy, spare)), orders.most(order, largest(slip, spare))
 
 
 @fill(orders.previous, Order)
-def _previous(order, v):
-    return before(v)
+def _previous(order, v, w):
+    return before(v), before(w)
 
 
 @fill(orders.join, Order)
-def join(order, ring, x):
+def _join(order, ring, x):
     end = HALO + LANES * order.rows
-    for k in range(2):
-        store(x, LANES * k, before(load(x, LANES * (order.rows + k))))
-        store(x, end + LANES * k, after(load(x, HALO + LANES * k)))
-        x[LANES * k], x[end + LANES * (k + 1) - 1] = 0.0, 0.0
-    for k in range(2 * ring):  # the two entries before disc 0 too, which may be in the rows above
-        x[LANES * (order.first + k)] = x[LANES * (order.rows + k) + LANES - 1]
-        x[end + LANES * (k + 1) - 1] = x[HALO + order.places[k]]
+    for row in range(x.shape[0]):
+        to = x[row]
+        for k in range(2):
+            store(to, LANES * k, before(load(to, LANES * (order.rows + k))))
+            store(to, end + LANES * k, after(load(to, HALO + LANES * k)))
+            to[LANES * k], to[end + LANES * (k + 1) - 1] = 0.0, 0.0
+        for k in range(2 * ring):  # the two entries before disc 0 too, which may be in the rows above
+            to[LANES * (order.first + k)] = to[LANES * (order.rows + k) + LANES - 1]
+            to[end + LANES * (k + 1) - 1] = to[HALO + order.places[k]]
 
 
 @fill(orders.wrap, Order)
 def _wrap(order, x):
-    for k in range(2):
-        i = LANES * (order.rows + k)
-        store(x, i, after(load(x, LANES * k)))
-        x[i + LANES - 1] = x[order.places[k]]
+    for row in range(x.shape[0]):
+        to = x[row]
+        for k in range(2):
+            i = LANES * (order.rows + k)
+            store(to, i, after(load(to, LANES * k)))
+            to[i + LANES - 1] = to[order.places[k]]
 
 
 @fill(orders.first_links, Order)
 def _first_links(order, ring, shift, x, e, to):
-    for i in range(0, LANES * (order.first + 1), LANES):
-        to[HALO + i] = 0.0
-    if ring:
-        i, end = LANES * order.first, x.size - 1
-        to[HALO + i] = (x[i] - x[end]) + (e[i] - e[end]) + shift
+    for row in range(x.shape[0]):
+        for i in range(0, LANES * (order.first + 1), LANES):
+            to[row, HALO + i] = 0.0
+        if ring:
+            i, end = LANES * order.first, x.shape[1] - 1
+            to[row, HALO + i] = (x[row, i] - x[row, end]) + (e[row, i] - e[row, end]) + shift[row]
 
 
 @fill(orders.rejoin, Order)
 def _rejoin(order, base, move, to):
     i = LANES * order.first
-    to[HALO + i] = base[HALO + i] + (move[i] - move[move.size - 1])
+    for row in range(2):
+        to[row, HALO + i] = base[row, HALO + i] + (move[row, i] - move[row, move.shape[1] - 1])
 
 
-@part
-def eliminate_ends(order, m):
-    """Eliminate the end discs of a chain with corners; they are then coupled to none."""
-    a, u, w = m.a, m.u, m.w
-    for end in range(2):
-        # places of four discs from the end inwards, and of the entries that couple them
-        e, f, g, h = (0, 1, 2, 3) if end == 0 else (order.n - 1, order.n - 2, order.n - 3, order.n - 4)
-        e, f, g, h = order.places[e], order.places[f], order.places[g], order.places[h]
-        ef, fg, gh, eg, fh = (e, f, g, e, f) if end == 0 else (f, g, h, g, h)
-        first, second, third, top = u[ef], w[eg], m.corner[end], 1 / a[e]
-        m.ends[end, 0], m.ends[end, 1], m.ends[end, 2], m.ends[end, 3] = first * top, second * top, third * top, top
-        a[f] -= first * top * first
-        u[fg] -= first * top * second
-        w[fh] -= first * top * third
-        a[g] -= second * top * second
-        u[gh] -= second * top * third
-        a[h] -= third * top * third
-        a[e], u[ef], w[eg] = 1.0, 0.0, 0.0
+@fill(orders.lead, Order)
+def _lead(order, m):
+    i, end, u, w = LANES * order.first, LANES * order.rows - 1, m.u, m.w
+    m.lead[0, i], m.lead[1, i], m.lead[1, i + LANES] = w[end - LANES], u[end], w[end]
 
 
-@fill(orders.factor, Order)
-def factor(order, ring, ghosts, m):
-    if ghosts:
-        eliminate_ends(order, m)
-    a, u, w, lead, d, o, last = m.a, m.u, m.w, m.lead, m.d, m.o, LANES * (order.rows - 1)
+@fill(orders.factor_separators, Order)
+def _factor_separators(order, ring, m, own, sums, ties):
+    for k in range(3):
+        store(m.d[k], 0, own[k] - after(sums[k]))
+    for k in range(4):
+        store(m.o[k], 0, after(ties[k]))
     if ring:
-        i, end = LANES * order.first, last + LANES - 1
-        lead[0, i], lead[1, i], lead[1, i + LANES] = w[end - LANES], u[end], w[end]
-    # the couplings of the first rows to the separators before them: those of the lane before
-    inner = load(order.inner, 0)
-    p0 = load(lead[0], 0) + inner * before(load(w, last - LANES))
-    q0 = load(lead[1], 0) + inner * before(load(u, last))
-    p1, q1 = load(lead[0], LANES), load(lead[1], LANES) + inner * before(load(w, last))
-    a0, u0, a1 = load(a, 0), load(u, 0), load(a, LANES)
-    pp, pq, qq = 0.0 * a0, 0.0 * a0, 0.0 * a0
-    for row in range(order.rows - 2):
-        i = LANES * row
-        top, second = 1.0 / a0, load(w, i)
-        l1, l2, p, q = u0 * top, second * top, p0 * top, q0 * top
-        pp, pq, qq = pp + p * p0, pq + p * q0, qq + q * q0
-        p2, q2 = -l2 * p0, -l2 * q0
-        if row < LEAD - 2:
-            p2, q2 = load(lead[0], i + 2 * LANES) + p2, load(lead[1], i + 2 * LANES) + q2
-        p0, q0, p1, q1 = p1 - l1 * p0, q1 - l1 * q0, p2, q2
-        store(a, i, top)
-        store(u, i, l1)
-        store(w, i, l2)
-        store(m.p, i, p)
-        store(m.q, i, q)
-        a0 = a1 - l1 * u0
-        u0 = load(u, i + LANES) - l1 * second
-        a1 = load(a, i + 2 * LANES) - l2 * second
-    # what the lanes leave on the separators before them, and the blocks that couple separators of a lane and the next one
-    store(d[0], 0, a0 - after(pp))
-    store(d[1], 0, u0 - after(pq))
-    store(d[2], 0, a1 - after(qq))
-    store(o[0], 0, after(p0))
-    store(o[1], 0, after(p1))
-    store(o[2], 0, after(q0))
-    store(o[3], 0, after(q1))
-    if ring:
-        border(d, o, m.columns, m.edge)
+        border(m.d, m.o, m.columns, m.edge)
     else:
-        blocks.factor(d, o, d.shape[1])
+        blocks.factor(m.d, m.o, LANES)
 
 
-@fill(orders.solve, Order)
-def solve(order, ring, ghosts, m, b):
-    n, ends, one, other = order.n, m.ends, order.places[0], order.places[order.n - 1]
-    first, last = b[one], b[other]
-    if ghosts:
-        b[one], b[other] = 0.0, 0.0
-        for k in range(3):
-            b[order.places[k + 1]] -= ends[0, k] * first
-            b[order.places[n - 2 - k]] -= ends[1, k] * last
-    b0, b1 = load(b, 0), load(b, LANES)
-    at_p, at_q = 0.0 * b0, 0.0 * b0
-    for row in range(order.rows - 2):
-        i = LANES * row
-        store(b, i, b0)
-        at_p, at_q = at_p + load(m.p, i) * b0, at_q + load(m.q, i) * b0
-        b0, b1 = b1 - load(m.u, i) * b0, load(b, i + 2 * LANES) - load(m.w, i) * b0
-    store(m.rest[0], 0, b0 - after(at_p))
-    store(m.rest[1], 0, b1 - after(at_q))
+@fill(orders.solve_separators, Order)
+def _solve_separators(order, ring, m, x, y, at_x, at_y):
+    store(m.rest[0], 0, x - after(at_x))
+    store(m.rest[1], 0, y - after(at_y))
     if ring:
         solve_border(m.d, m.o, m.columns, m.edge, m.rest)
     else:
-        blocks.substitute(m.d, m.o, m.rest, m.d.shape[1])
-    x1, x2 = load(m.rest[0], 0), load(m.rest[1], 0)
-    p, q = before(x1), before(x2)
-    store(b, LANES * (order.rows - 2), x1)
-    store(b, LANES * (order.rows - 1), x2)
-    for row in range(order.rows - 3, -1, -1):
-        i = LANES * row
-        known = load(b, i) * load(m.a, i) - load(m.p, i) * p - load(m.q, i) * q
-        x1, x2 = known - load(m.w, i) * x2 - load(m.u, i) * x1, x1
-        store(b, i, x1)
-    if ghosts:
-        b[one], b[other] = ends[0, 3] * first, ends[1, 3] * last
-        for k in range(3):
-            b[one] -= ends[0, k] * b[order.places[k + 1]]
-            b[other] -= ends[1, k] * b[order.places[n - 2 - k]]
+        blocks.substitute(m.d, m.o, m.rest, LANES)
+    x, y = load(m.rest[0], 0), load(m.rest[1], 0)
+    return x, y, before(x), before(y)

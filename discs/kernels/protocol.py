@@ -193,6 +193,21 @@ def step(method, chain, work, room, before, after, t, h):
 
 
 @stub
+def most(chain, x):
+    """The largest x of the threads that share a chain; x itself if there is one, see `discs.kernels.parts`."""
+
+
+@stub
+def added(chain, x):
+    """The sum of their x."""
+
+
+@stub
+def halted(chain, size):
+    """As `discs.kernels.interrupts.interrupted`, for all of them at once."""
+
+
+@stub
 def jumps(method):
     """Whether stages may jump across r' = 0, as in explicit steps; vanishing headings are then detected by the velocity."""
 

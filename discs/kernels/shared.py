@@ -5,8 +5,10 @@ c, v : (rows, n). p : (1, n), or (2, n) for steered discs.
 
 import numpy as np
 
+from discs.kernels import orders
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part, stub
+from discs.kernels.interrupts import interrupted
 from discs.skew import Phase
 
 
@@ -149,7 +151,7 @@ def _kinetic(state, chain, h):
         pi = state.pi[row]
         for i in range(pi.size):
             total += pi[i] * pi[i]
-    return 0.5 * total
+    return do.added(chain, 0.5 * total)
 
 
 @fill(do.rate, Phase)
@@ -192,6 +194,24 @@ def ahead(chain, work, state, h, c, half, slope):
 @fill(do.place, object)
 def _place(chain, i):
     return i
+
+
+@fill(do.most, object)
+@fill(orders.most, object)
+def _most(chain, x):
+    return x
+
+
+@fill(do.added, object)
+@fill(orders.added, object)
+def _added(chain, x):
+    return x
+
+
+@fill(do.halted, object)
+@fill(orders.halted, object)
+def _halted(chain, size):
+    return interrupted(size)
 
 
 @fill(do.enter, object, _nrt=True)

@@ -14,9 +14,11 @@ from discs.kernels import lanes
 from discs.kernels import protocol as do
 from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill, part
-from discs.kernels.lanes import HALO, Order, order
+from discs.kernels.lanes import HALO, Order, order, put
 from discs.kernels.limits import LOST_HEADING
-from discs.kernels.orders import close_links, first_links, join, matrices, pick, previous, rejoin
+from discs.kernels.meeting import meet
+from discs.kernels.orders import added, close_links, first_links, halted, join, matrices, most, pick, previous, rejoin
+from discs.kernels.parts import Part, beside, side
 from discs.kernels.slaved import Slaved
 from discs.kernels.slaved_matrix import GHOST, RING
 from discs.kernels.vectors import LANES, after, load, store
@@ -31,7 +33,7 @@ class Laned(NamedTuple):
     length : (LANES,), the scale of x and y. half : (LANES,), 1/2k.
     """
 
-    order: Order
+    order: Order | Part
     radius: NDArray
     weights: NDArray
     bend: NDArray
@@ -89,29 +91,21 @@ def apart(chain: Slaved) -> tuple[NDArray, NDArray, NDArray]:
     return bend, torsion, springs
 
 
-def arranged(chain: Slaved) -> Laned:
-    """The parameters in lanes, for linear curvature."""
-    n, ring = chain.radius.size, chain.ends == RING
-    own, links = order(n), chain.links
-
-    def put(values: NDArray, rest: float = 0.0, halo: int = 0) -> NDArray:
-        to = np.full((*values.shape[:-1], LANES * own.rows + 2 * halo), rest)
-        to[..., halo + own.places] = values[..., :n]
-        if halo:
-            join(own, ring, to)
-        return to
-
-    weights = put(chain.weights)
+def arranged(chain: Slaved, own: Order | Part | None = None) -> Laned:
+    """The parameters in lanes, for linear curvature; of a part of the chain if its order is given."""
+    n, ring, links = chain.radius.size, chain.ends == RING, chain.links
+    own = own or order(n)
+    weights = put(own, chain.weights)
     weights[2, weights[2] == 0.0] = 1.0  # what belongs to no disc
     bend, torsion, springs = apart(chain)
     return Laned(
         own,
-        put(chain.radius),
+        put(own, chain.radius),
         weights,
-        put(bend, halo=HALO),
-        put(torsion, halo=HALO),
-        put(links.hessian),
-        put(links.twist),
+        put(own, bend, 0.0, HALO, ring),
+        put(own, torsion[:n], 0.0, HALO, ring),
+        put(own, links.hessian),
+        put(own, links.twist),
         links.corner,
         springs,
         chain.scale,
@@ -168,28 +162,65 @@ def _settle(chain, work, hi, lo):
     end, ring = LANES * (chain.order.rows - 1), chain.ends == RING
     for axis in range(3):
         x, e, to = hi[axis], lo[axis], work.base[axis]
-        last, lost = previous(chain.order, load(x, end)), previous(chain.order, load(e, end))
+        last, lost = previous(chain.order, load(x, end), load(e, end))
         for i in range(0, x.size, LANES):
             here, low = load(x, i), load(e, i)
             store(to, HALO + i, (here - last) + (low - lost))
             last, lost = here, low
-        first_links(chain.order, ring, chain.shift[axis], x, e, to)
-        join(chain.order, ring, to)
+    first_links(chain.order, ring, chain.shift, hi, lo, work.base)
+    join(chain.order, ring, work.base)
 
 
 @fill(close_links, Order)
 def _close_links(order, ends, x):
-    first, last, end = HALO + LANES * order.first, HALO + LANES * order.rows - 1, HALO + LANES * order.rows
-    store(x, end, after(load(x, HALO)))
-    second, third = x[HALO + order.places[1]], x[HALO + order.places[2]]
-    if ends == RING:
-        x[end + LANES - 1] = x[first]
-    elif ends == GHOST:
-        x[first] = 3 * (second - third) + x[HALO + order.places[3]]
-        x[end + LANES - 1] = 3 * (x[last] - x[last - LANES]) + x[last - 2 * LANES]
-    else:
-        x[first] = 2 * second - third
-        x[end + LANES - 1] = 2 * x[last] - x[last - LANES]
+    first, end = HALO + LANES * order.first, HALO + LANES * order.rows
+    for axis in range(2):
+        to = x[axis]
+        store(to, end, after(load(to, HALO)))
+        if ends == RING:
+            to[end + LANES - 1] = to[first]
+        else:
+            close_left(order, ends, to)
+            close_right(order, ends, to)
+        before_first(order, to)
+
+
+@fill(close_links, Part)
+def _close_links_of_part(order, ends, x):
+    first, end, notes = HALO + LANES * order.first, HALO + LANES * order.rows, order.real[side(order)]
+    for axis in range(2):
+        notes[order.number, axis] = x[axis, first]
+    meet(order.arrived, order.number)
+    _, on = beside(order)
+    for axis in range(2):
+        to = x[axis]
+        store(to, end, after(load(to, HALO)))
+        to[end + LANES - 1] = notes[on, axis]
+        if ends != RING and order.left == 0:
+            close_left(order, ends, to)
+        if ends != RING and order.right == 2:
+            close_right(order, ends, to)
+        before_first(order, to)
+
+
+@part
+def close_left(order, ends, x):
+    """Set the link before the first disc."""
+    first, second, third = HALO + order.places[0], x[HALO + order.places[1]], x[HALO + order.places[2]]
+    x[first] = 3 * (second - third) + x[HALO + order.places[3]] if ends == GHOST else 2 * second - third
+
+
+@part
+def close_right(order, ends, x):
+    """Set the link after the last disc."""
+    end, last = HALO + LANES * (order.rows + 1) - 1, HALO + LANES * order.rows - 1
+    x[end] = 3 * (x[last] - x[last - LANES]) + x[last - 2 * LANES] if ends == GHOST else 2 * x[last] - x[last - LANES]
+
+
+@part
+def before_first(order, x):
+    """Set the links of what belongs to no disc, so that its headings are those of disc 0."""
+    first, second = HALO + LANES * order.first, x[HALO + order.places[1]]
     for i in range(first - LANES, HALO - 1, -LANES):
         x[i] = x[first] + second - x[i + LANES]
 
@@ -197,16 +228,17 @@ def _close_links(order, ends, x):
 @part
 def moved(chain, base, move, d):
     """d = the links (2, n' + 2 HALO) after a move."""
+    end = move.shape[1] - LANES
+    ends = previous(chain.order, load(move[0], end), load(move[1], end))
     for axis in range(2):
-        x, from_, to = move[axis], base[axis], d[axis]
-        last = previous(chain.order, load(x, x.size - LANES))
+        x, from_, to, last = move[axis], base[axis], d[axis], ends[axis]
         for i in range(0, x.size, LANES):
             here = load(x, i)
             store(to, HALO + i, load(from_, HALO + i) + (here - last))
             last = here
-        if chain.ends == RING:
-            rejoin(chain.order, from_, x, to)
-        close_links(chain.order, chain.ends, to)
+    if chain.ends == RING:
+        rejoin(chain.order, base, move, d)
+    close_links(chain.order, chain.ends, d)
 
 
 @fill(do.spend, *LANED)
@@ -217,6 +249,21 @@ def _spend(chain, state, t, weight, move, v, scale):
 @fill(do.vanishing, *LANED)
 def _vanishing(chain):
     return do.vanishing(chain.rolling)
+
+
+@fill(do.most, *LANED)
+def _most(chain, x):
+    return most(chain.order, x)
+
+
+@fill(do.added, *LANED)
+def _added(chain, x):
+    return added(chain.order, x)
+
+
+@fill(do.halted, *LANED)
+def _halted(chain, size):
+    return halted(chain.order, size)
 
 
 @fill(do.lost, *LANED)
@@ -236,6 +283,7 @@ def _lost(chain, work, slope):
             part = min(max(-(ax * mx + ay * my) / max(mx * mx + my * my, 1e-300), 0.0), 1.0)
             nearest = (ax + part * mx) ** 2 + (ay + part * my) ** 2
             if nearest < worst:
-                worst, disc = nearest, rows * lane + row - chain.order.first
+                worst, disc = nearest, chain.order.disc + rows * lane + row - chain.order.first
             slope[0, i], slope[1, i] = bx, by
-    return disc
+    nearest = -most(chain.order, -worst)
+    return int(most(chain.order, disc if worst == nearest else -1.0))

@@ -4,7 +4,7 @@
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO
-from discs.kernels.orders import pick, solve
+from discs.kernels.orders import most, pick, solve
 from discs.kernels.slaved_lanes import LANED, moved
 from discs.kernels.slaved_matrix import GHOST, RING
 from discs.kernels.slaved_sweeps import frozen, pulled
@@ -78,4 +78,4 @@ def renewed(chain, work, rule, own, h, p, v):
             store(q, i, r)
             store(vx, i, load(cx, i) * r)
             store(vy, i, load(cy, i) * r)
-    return max(largest(larger(far_x, far_y) / load(chain.length, 0), work.spare), largest(far, work.spare))
+    return most(chain.order, max(largest(larger(far_x, far_y) / load(chain.length, 0), work.spare), largest(far, work.spare)))

@@ -8,8 +8,9 @@ import numpy as np
 from discs.kernels import protocol as do
 from discs.kernels.abreast import END
 from discs.kernels.compiled import fill, part
-from discs.kernels.lanes import HALO, Order
-from discs.kernels.orders import bend_ends, corners, factor, join, pick, present, pull_ends, record, solve, wrap
+from discs.kernels.elimination import ONE
+from discs.kernels.lanes import HALO
+from discs.kernels.orders import bend_ends, corners, factor, join, most, pick, present, pull_ends, record, solve, wrap
 from discs.kernels.shared import forward, reach
 from discs.kernels.slaved_lanes import LANED, moved
 from discs.kernels.slaved_matrix import GHOST, RING
@@ -76,8 +77,7 @@ def pulled(chain, work, c, g):
     """g = C^T grad V after the move work.half."""
     base, half, bend, torsion = work.base, work.half, chain.bend, chain.torsion
     bx, by, bt, vx, vy, vt, cx, cy, ct = base[0], base[1], base[2], half[0], half[1], half[2], c[0], c[1], c[2]
-    for axis in range(3):
-        join(chain.order, chain.ends == RING, half[axis])
+    join(chain.order, chain.ends == RING, half)
     link_x, before_x = bent(bend, bx, vx, HALO, link(bx, vx, LANES))
     link_y, before_y = bent(bend, by, vy, HALO, link(by, vy, LANES))
     link_x, moment_x = bent(bend, bx, vx, HALO + LANES, link_x)
@@ -108,19 +108,19 @@ def end_moment(order, base, half, end):
     return moment
 
 
-@fill(bend_ends, Order)
+@fill(bend_ends, *ONE)
 def _bend_ends(order, springs, base, still):
     energy = 0.0
-    for end in range(2):
+    for end in range(order.left, order.right):
         for axis in range(2):
             energy += springs[end] * end_moment(order, base[axis], still[axis], end) ** 2
-    return (1.0 - load(order.inner, 0)) * energy  # in one lane
+    return (energy / LANES) + zero()
 
 
-@fill(pull_ends, Order)
+@fill(pull_ends, *ONE)
 def _pull_ends(order, springs, base, half, c, g):
     last = order.n - 1
-    for end in range(2):
+    for end in range(order.left, order.right):
         for axis in range(2):
             moment = end_moment(order, base[axis], half[axis], end)
             for k, share in enumerate(END):
@@ -128,9 +128,9 @@ def _pull_ends(order, springs, base, half, c, g):
                 g[i] += c[axis, i] * (share if end == 0 else -share) * springs[end] * moment
 
 
-@fill(corners, Order)
+@fill(corners, *ONE)
 def _corners(order, given, g, c, to):
-    for end in range(2):
+    for end in range(order.left, order.right):
         i, j = order.places[0 if end == 0 else order.n - 4], order.places[3 if end == 0 else order.n - 1]
         to[end] = g * (given[end] * (c[0, i] * c[0, j] + c[1, i] * c[1, j]))
 
@@ -141,8 +141,7 @@ def assemble(chain, c, one, g, m):
     a, u, w, n = m.a, m.u, m.w, m.a.size
     s0, s1, s2, t0, t1 = chain.hessian[0], chain.hessian[1], chain.hessian[2], chain.twist[0], chain.twist[1]
     cx, cy, ct = c[0], c[1], c[2]
-    for axis in range(3):
-        wrap(chain.order, c[axis])
+    wrap(chain.order, c)
     x, y, t, x1, y1, t1_ = load(cx, 0), load(cy, 0), load(ct, 0), load(cx, LANES), load(cy, LANES), load(ct, LANES)
     for i in range(0, n, LANES):
         x2, y2, t2 = load(cx, i + HALO), load(cy, i + HALO), load(ct, i + HALO)
@@ -183,7 +182,7 @@ def _sweep(chain, work, state, t, h, p, move, first):
         store(x, i, new_x)
         store(y, i, new_y)
         store(theta, i, new)
-    return max(largest(larger(far_x, far_y) / load(chain.length, 0), work.spare), largest(far, work.spare))
+    return most(chain.order, max(largest(larger(far_x, far_y) / load(chain.length, 0), work.spare), largest(far, work.spare)))
 
 
 @fill(reach, *LANED)

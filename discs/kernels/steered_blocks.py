@@ -10,37 +10,31 @@ That leaves the separators. Of one chain they are a block tridiagonal system, cl
 solves. Chains side by side have one each, tied to itself on a ring: D -> D + P + P^T; at free ends there is no P.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.kernels import blocks
+from discs.kernels import orders
 from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill, part, stub
 from discs.kernels.lanes import Order
 from discs.kernels.orders import present, previous
-from discs.kernels.steered_matrix import border, solve_border
-from discs.kernels.vectors import LANES, after, load, store
+from discs.kernels.parts import Part
+from discs.kernels.vectors import LANES, load, store
 
 
 class Blocks(NamedTuple):
     """A matrix, real or complex, factored in place: d (3, n'), o (4, n') as in `discs.kernels.blocks`, then D^{-1} and L;
     p (4, n'), D^{-1} P, without entries for chains side by side with free ends.
 
-    sums : (3, LANES), of P^T D^{-1} P. ends, links, columns, edge : the separators of
-    one chain. rest : (2, LANES), their right side.
+    joints : of the separators of one chain.
     """
 
     d: NDArray
     o: NDArray
     p: NDArray
-    sums: NDArray
-    ends: NDArray
-    links: NDArray
-    columns: NDArray
-    edge: NDArray
-    rest: NDArray
+    joints: Any
 
 
 @part(_nrt=True)
@@ -48,15 +42,13 @@ def matrices(order, ring, g, count):
     """Workspace for `count` matrices of zeros, real or complex as g."""
     n, kind = LANES * order.rows, np.array([g]).dtype
     d, o, p = np.zeros((count, 3, n), kind), np.zeros((count, 4, n), kind), np.zeros((count, 4, n * tied(order, ring)), kind)
-    sums, ends, links = np.zeros((count, 3, LANES), kind), np.zeros((count, 3, LANES), kind), np.zeros((count, 4, LANES), kind)
-    columns, edge, rest = np.zeros((count, 2, 2, LANES), kind), np.zeros((count, 11), kind), np.zeros((count, 2, LANES), kind)
-    return Blocks(d, o, p, sums, ends, links, columns, edge, rest)
+    return Blocks(d, o, p, orders.separators(order, g, count))
 
 
 @part
 def pick(m, j):
     """One of `matrices`."""
-    return Blocks(m.d[j], m.o[j], m.p[j], m.sums[j], m.ends[j], m.links[j], m.columns[j], m.edge[j], m.rest[j])
+    return Blocks(m.d[j], m.o[j], m.p[j], orders.pick(m.joints, j))
 
 
 @stub
@@ -64,27 +56,13 @@ def tied(order, ring):
     """Whether rows are tied to separators."""
 
 
-@stub
-def factor_separators(order, ring, m):
-    """Factor the system of the separators, whose blocks D and P are in the last row."""
-
-
-@stub
-def separators(order, ring, m, x, y, at_x, at_y):
-    """The solution (x, y) at the separators, for their right side (x, y), of which the lanes after them take (at_x, at_y)."""
-
-
 @part
 def factor(order, ring, m):
     """Factor a matrix, whose entries are d and o; the last block of o ties a lane to the next one."""
     d, o, w, last, bound = m.d, m.o, m.p, LANES * (order.rows - 1), tied(order, ring)
     p, q, r = load(d[0], 0), load(d[1], 0), load(d[2], 0)
-    x0, x1, x2, x3 = (
-        previous(order, load(o[0], last)),
-        previous(order, load(o[2], last)),
-        previous(order, load(o[1], last)),
-        previous(order, load(o[3], last)),
-    )
+    x0, x1 = previous(order, load(o[0], last), load(o[2], last))
+    x2, x3 = previous(order, load(o[1], last), load(o[3], last))
     s0, s1, s2 = 0.0 * p, 0.0 * p, 0.0 * p
     y0, y1, y2, y3, inner = x0, x1, x2, x3, present(order, 0)
     if order.first > 0:  # disc 0 is further down
@@ -114,15 +92,7 @@ def factor(order, ring, m):
         p = load(d[0], i + LANES) - (l0 * a + l1 * e)
         q = load(d[1], i + LANES) - (l0 * b + l1 * f)
         r = load(d[2], i + LANES) - (l2 * b + l3 * f)
-    store(d[0], last, p)
-    store(d[1], last, q)
-    store(d[2], last, r)
-    if bound:
-        for k, value in enumerate((x0, x1, x2, x3)):
-            store(w[k], last, value)
-        for k, value in enumerate((s0, s1, s2)):
-            store(m.sums[k], 0, value)
-    factor_separators(order, ring, m)
+    orders.factor_separators(order, ring, m.joints, (p, q, r), (s0, s1, s2), (x0, x2, x1, x3))  # P transposed
 
 
 @part
@@ -142,10 +112,9 @@ def solve(order, ring, m, b):
             load(roll, i + LANES) - (load(o[0], i) * x + load(o[1], i) * y),
             load(turn, i + LANES) - (load(o[2], i) * x + load(o[3], i) * y),
         )
-    x, y = separators(order, ring, m, x, y, at_x, at_y)
+    x, y, p, q = orders.solve_separators(order, ring, m.joints, x, y, at_x, at_y)
     store(roll, last, x)
     store(turn, last, y)
-    p, q = previous(order, x), previous(order, y)
     for i in range(last - LANES, -1, -LANES):
         r, s = load(roll, i), load(turn, i)
         x, y = (
@@ -158,36 +127,9 @@ def solve(order, ring, m, b):
         store(turn, i, y)
 
 
-# One chain
-
-
-@fill(tied, Order)
+@fill(tied, Order, Part)
 def _tied(order, ring):
     return True
-
-
-@fill(factor_separators, Order)
-def _factor_separators(order, ring, m):
-    last = LANES * (order.rows - 1)
-    for k in range(3):
-        store(m.ends[k], 0, load(m.d[k], last) - after(load(m.sums[k], 0)))
-    for k, row in enumerate((0, 2, 1, 3)):  # transposed
-        store(m.links[k], 0, after(load(m.p[row], last)))
-    if ring:
-        border(m.ends, m.links, m.columns, m.edge)
-    else:
-        blocks.factor(m.ends, m.links, LANES)
-
-
-@fill(separators, Order)
-def _separators(order, ring, m, x, y, at_x, at_y):
-    store(m.rest[0], 0, x - after(at_x))
-    store(m.rest[1], 0, y - after(at_y))
-    if ring:
-        solve_border(m.ends, m.links, m.columns, m.edge, m.rest)
-    else:
-        blocks.substitute(m.ends, m.links, m.rest, LANES)
-    return load(m.rest[0], 0), load(m.rest[1], 0)
 
 
 # Chains side by side
@@ -198,22 +140,37 @@ def _tied_abreast(order, ring):
     return ring
 
 
-@fill(factor_separators, Abreast)
-def _factor_last(order, ring, m):
-    d, last = m.d, LANES * (order.rows - 1)
-    p, q, r = load(d[0], last), load(d[1], last), load(d[2], last)
+class Last(NamedTuple):
+    """The inverse of the block of the last row of chains side by side, d (3, LANES)."""
+
+    d: NDArray
+
+
+@fill(orders.separators, Abreast, _nrt=True)
+def _separators(order, g, count):
+    return Last(np.zeros((count, 3, LANES), np.array([g]).dtype))
+
+
+@fill(orders.pick, Last)
+def _pick(m, j):
+    return Last(m.d[j])
+
+
+@fill(orders.factor_separators, Abreast)
+def _factor_last(order, ring, m, own, sums, ties):
+    p, q, r = own
     if ring:
-        s0, s1, s2, x0, x1 = load(m.sums[0], 0), load(m.sums[1], 0), load(m.sums[2], 0), load(m.p[0], last), load(m.p[1], last)
-        p, q, r = p - s0 + 2.0 * x0, q - s1 + (x1 + load(m.p[2], last)), r - s2 + 2.0 * load(m.p[3], last)
+        p, q, r = p - sums[0] + 2.0 * ties[0], q - sums[1] + (ties[2] + ties[1]), r - sums[2] + 2.0 * ties[3]
     det = 1.0 / (p * r - q * q)
-    store(d[0], last, r * det)
-    store(d[1], last, -q * det)
-    store(d[2], last, p * det)
+    store(m.d[0], 0, r * det)
+    store(m.d[1], 0, -q * det)
+    store(m.d[2], 0, p * det)
 
 
-@fill(separators, Abreast)
+@fill(orders.solve_separators, Abreast)
 def _last(order, ring, m, x, y, at_x, at_y):
-    d, last = m.d, LANES * (order.rows - 1)
+    p, q, r = load(m.d[0], 0), load(m.d[1], 0), load(m.d[2], 0)
     if ring:
         x, y = x - at_x, y - at_y
-    return load(d[0], last) * x + load(d[1], last) * y, load(d[1], last) * x + load(d[2], last) * y
+    x, y = p * x + q * y, q * x + r * y
+    return x, y, x, y

@@ -15,8 +15,9 @@ from discs.kernels import lanes, steered_blocks
 from discs.kernels import protocol as do
 from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill
-from discs.kernels.lanes import HALO, Order, order
-from discs.kernels.orders import first_links, join, previous
+from discs.kernels.lanes import HALO, Order, order, put
+from discs.kernels.orders import added, first_links, halted, join, most, previous
+from discs.kernels.parts import Part
 from discs.kernels.steered import Steered
 from discs.kernels.steered_links import turn
 from discs.kernels.vectors import LANES, load, store
@@ -31,7 +32,7 @@ class Turning(NamedTuple):
     length, per : (LANES,), the scale of x and y, 1/k.
     """
 
-    order: Order
+    order: Order | Part
     weights: NDArray
     paces: NDArray
     stiffness: NDArray
@@ -67,19 +68,12 @@ class TurningBundle(NamedTuple):
 TURNING = Turning, TurningBundle
 
 
-def arranged(chain: Steered) -> Turning:
-    """The parameters of one chain in lanes, for links of degree 1."""
-    own = order(chain.weights.shape[1])
-
-    def put(values: NDArray, halo: int = 0) -> NDArray:
-        to = np.zeros((len(values), LANES * own.rows + 2 * halo))
-        to[:, halo + own.places] = values[:, : own.n]
-        for row in to if halo else ():
-            join(own, chain.ring, row)
-        return to
-
+def arranged(chain: Steered, own: Order | Part | None = None) -> Turning:
+    """The parameters of one chain in lanes, for links of degree 1; of a part of it if its order is given."""
+    n = chain.weights.shape[1]
+    own = own or order(n)
     length, per = np.full(LANES, chain.scale[0]), np.full(LANES, 1 / chain.k)
-    parts = put(chain.weights), put(chain.paces), put(scaled(chain), HALO)
+    parts = put(own, chain.weights), put(own, chain.paces), put(own, scaled(chain)[:, :n], 0.0, HALO, chain.ring)
     return Turning(own, *parts, chain.scale, length, chain.shift, per, chain.ring, lanes.loaded(own, chain.load))
 
 
@@ -140,13 +134,13 @@ def _settle(chain, work, hi, lo):
     base, end, per = work.base, LANES * (chain.order.rows - 1), load(chain.per, 0)
     for row in range(4):
         x, e, to = hi[row], lo[row], base[row]
-        last, lost = previous(chain.order, load(x, end)), previous(chain.order, load(e, end))
+        last, lost = previous(chain.order, load(x, end), load(e, end))
         for i in range(0, x.size, LANES):
             here, low = load(x, i), load(e, i)
             store(to, HALO + i, (here - last) + (low - lost))
             last, lost = here, low
-        first_links(chain.order, chain.ring, chain.shift[row], x, e, to)
-        join(chain.order, chain.ring, to)
+    first_links(chain.order, chain.ring, chain.shift, hi, lo, base)
+    join(chain.order, chain.ring, base)
     for i in range(0, hi.shape[1], LANES):
         j = HALO + i
         phi = load(hi[3], i) + load(lo[3], i)
@@ -159,9 +153,8 @@ def _settle(chain, work, hi, lo):
         store(work.middle[1], j, sin)
         store(work.strain[0], j, (cos * x + sin * y) * per - 1.0)
         store(work.strain[1], j, (cos * y - sin * x) * per)
-    for row in range(2):
-        join(chain.order, chain.ring, work.middle[row])
-        join(chain.order, chain.ring, work.strain[row])
+    join(chain.order, chain.ring, work.middle)
+    join(chain.order, chain.ring, work.strain)
 
 
 @fill(do.spend, *TURNING)
@@ -172,6 +165,21 @@ def _spend(chain, state, t, weight, move, v, scale):
 @fill(do.vanishing, *TURNING)
 def _vanishing(chain):
     return False
+
+
+@fill(do.most, *TURNING)
+def _most(chain, x):
+    return most(chain.order, x)
+
+
+@fill(do.added, *TURNING)
+def _added(chain, x):
+    return added(chain.order, x)
+
+
+@fill(do.halted, *TURNING)
+def _halted(chain, size):
+    return halted(chain.order, size)
 
 
 @fill(do.lost, *TURNING)

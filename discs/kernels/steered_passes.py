@@ -6,7 +6,7 @@ import numpy as np
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO
-from discs.kernels.orders import join, present, record, wrap
+from discs.kernels.orders import join, most, present, record, wrap
 from discs.kernels.shared import forward
 from discs.kernels.steered_blocks import factor, pick, solve
 from discs.kernels.steered_lanes import TURNING
@@ -86,8 +86,7 @@ def link(chain, work, j, full, keep):
 @part
 def pulled(chain, work, c, g, full, keep):
     """g = C^T grad V after work.half, see `link`."""
-    for row in range(4):
-        join(chain.order, chain.ring, work.half[row])
+    join(chain.order, chain.ring, work.half)
     x, y, t, p, couple = link(chain, work, HALO, full, keep)
     for i in range(0, g.shape[1], LANES):
         x1, y1, t1, p1, next_ = link(chain, work, HALO + LANES + i, full, keep)
@@ -103,8 +102,7 @@ def assemble(chain, work, c, one, g, m):
     (4, n' + HALO)."""
     along_x, along_y, across_x, across_y = work.section[0], work.section[1], work.section[2], work.section[3]
     d, o, k = m.d, m.o, chain.stiffness
-    for row in range(4):
-        wrap(chain.order, c[row])
+    wrap(chain.order, c)
     cx, cy, ct, cp = load(c[0], 0), load(c[1], 0), load(c[2], 0), load(c[3], 0)
     ax, ay, bx, by = load(along_x, 0), load(along_y, 0), load(across_x, 0), load(across_y, 0)
     s0, s1, s2, s3 = load(k[0], HALO), load(k[1], HALO), load(k[2], HALO), load(k[3], HALO)
@@ -172,7 +170,7 @@ def renewed(chain, work, c, half, p, change, move):
         store(y, i, new_y)
         store(theta, i, new)
         store(phi, i, angle)
-    return max(largest(far / load(chain.length, 0), work.spare), largest(turned, work.spare))
+    return most(chain.order, max(largest(far / load(chain.length, 0), work.spare), largest(turned, work.spare)))
 
 
 @part

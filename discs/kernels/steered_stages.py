@@ -4,6 +4,7 @@
 from discs.kernels import protocol as do
 from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO
+from discs.kernels.orders import most
 from discs.kernels.stage_sums import mix, residual, residuals, workspace
 from discs.kernels.steered_blocks import pick, solve
 from discs.kernels.steered_lanes import TURNING
@@ -94,4 +95,4 @@ def renewed(chain, work, rule, own, h, p, v):
             store(roll, i, r)
             store(turn, i, q)
             store(swings, i, swing * q)
-    return max(largest(far / load(chain.length, 0), work.spare), largest(turned, work.spare))
+    return most(chain.order, max(largest(far / load(chain.length, 0), work.spare), largest(turned, work.spare)))

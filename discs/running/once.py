@@ -71,7 +71,7 @@ def run_once(
     if end / h > MOST_STEPS:
         check_steps(end, h)
     plan, there = planned(problem, integrator, asked, want, h)
-    about = begun(integrator, plan.because, want, h, dt is None)
+    about = begun(integrator, plan.because, want, h, dt is None, integrator.threads(plan.system))
     if more:
         about |= more
     last, started = steps_before(end, h), clock.perf_counter()

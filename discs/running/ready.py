@@ -7,6 +7,7 @@ import numpy as np
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators import FixedStep, Integrator
 from discs.kernels.background import Kernels
+from discs.kernels.teams import Team
 from discs.problem import Problem
 from discs.running.album import Album
 from discs.running.plan import Plan
@@ -46,4 +47,6 @@ def compile_kernels(problem: Problem, integrator: Integrator, h: float, asked: b
 def kinds(system: RollingDiscs, integrator: Integrator, asked: bool) -> tuple[object, ...]:
     """What the kernels of a run depend on. asked : whether frames are asked for, or recorded by steps."""
     chain = integrator.twin_of(system, system.parameters) if isinstance(integrator, FixedStep) else system.parameters
+    if isinstance(chain, Team):
+        chain = chain.chains[0]
     return asked, type(integrator), type(chain), *map(type, chain or ())  # the types of the chain's laws and load too

@@ -30,7 +30,7 @@ from discs.stats import Stats, of_search
 from discs.warn import warn
 
 SECONDS = 1.0  # between two restart files, or twenty times the time of writing one if that is more
-SETTINGS = ("settings", "dt", "engine", "want")  # entries of stats that must agree for a run to continue
+SETTINGS = ("settings", "dt", "engine", "threads", "want")  # entries of stats that must agree for a run to continue
 
 
 class Rows:

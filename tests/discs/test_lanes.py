@@ -9,7 +9,7 @@ from compare import lump
 from continuum import untwisting_rod
 from discs import Midpoint, SimulationError, simulate
 from discs.integrators import METHODS
-from discs.kernels import lanes, orders, vectors
+from discs.kernels import elimination, lanes, orders, vectors  # noqa: F401, the elimination
 from discs.kernels import protocol as do
 from discs.kernels.compiled import jit
 from discs.kernels.lean import lean
