@@ -10,9 +10,8 @@ import numpy as np
 from discs.arrays import Float
 from discs.chains.rolling_discs import RollingDiscs
 from discs.integrators.work import NO_LOOKS, NO_STOPS, NOTHING, Cut, Frame, Looks, Memory, Stops, Tally, Work
-from discs.kernels import driver
+from discs.kernels import driver, teams
 from discs.kernels.direct import Known, direct
-from discs.kernels import teams
 from discs.skew import Parameters, Phase
 
 

@@ -15,7 +15,7 @@ from discs.skew import add
 FEWEST = 64  # discs of a thread
 
 _THREADS = ContextVar("threads", default=1)
-_COMPILED: set[tuple[type, ...]] = set()  # kinds of methods and chains whose kernels are there
+_COMPILED: set[tuple[object, ...]] = set()  # kernels, and kinds of methods and chains, that were called
 
 
 class Team(NamedTuple):
@@ -89,7 +89,7 @@ def march(
             raise
         return result
 
-    if (kinds := (type(method), *map(type, team.chains[0]))) not in _COMPILED:
+    if (kinds := (kernel, type(method), *map(type, team.chains[0]))) not in _COMPILED:
         kernel(method, alone(team.chains[0]), *pieces[0][2:5], 0, *pieces[0][6:])
         _COMPILED.add(kinds)
     with ThreadPoolExecutor(count - 1) as pool:
