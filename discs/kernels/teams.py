@@ -81,22 +81,25 @@ def march(
         frame = stops, rests, positions, v, told if not pieces else told.copy()
         pieces.append((method, chain, type(state)(*z), t, h, steps, bound, first, *look, most, many, since, framed, *frame))
 
+    failed = list[BaseException]()
+
     def run(number: int) -> tuple[Any, ...]:
         try:
-            result: tuple[Any, ...] = kernel(*pieces[number])
-        except BaseException:
+            return tuple(kernel(*pieces[number]))
+        except BaseException as error:
+            failed.append(error)
             board[2][LINE * number] = GONE  # the others go on without this thread; what they find is dropped
-            raise
-        return result
+            return ()
 
     if (kinds := (kernel, type(method), *map(type, team.chains[0]))) not in _COMPILED:
         kernel(method, alone(team.chains[0]), *pieces[0][2:5], 0, *pieces[0][6:])
         _COMPILED.add(kinds)
     with ThreadPoolExecutor(count - 1) as pool:
-        others = [pool.submit(Context().run, run, number) for number in range(1, count)]
+        for number in range(1, count):
+            pool.submit(Context().run, run, number)
         found = Context().run(run, 0)
-    for other in others:
-        other.result()
+    if failed:
+        raise failed[0]
     for discs, parts in zip(own, cut, strict=True):
         for array, part in zip(whole, parts, strict=True):
             if array.size:
