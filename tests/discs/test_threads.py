@@ -13,10 +13,13 @@ import pytest
 from discs import Midpoint, SimulationError, load, simulate
 from discs.integrators import METHODS
 from discs.kernels import driver, elimination, meeting, orders, parts, steered_blocks, teams  # noqa: F401, the elimination
+from discs.kernels import protocol as do
 from discs.kernels.compiled import jit
+from discs.kernels.lanes import HALO
 from discs.kernels.meeting import LINE, meet
 from discs.kernels.teams import Team, using
 from discs.kernels.vectors import LANES
+from discs.skew import Phase
 from tests.conftest import SLAVED, STEERED, Model, models, uneven
 from tests.discs.test_kernels import CLOSE, dense_banded
 from tests.discs.test_lanes import apart
@@ -121,6 +124,28 @@ def test_loads(model, kernels_as_python):
     one, several = (simulate(problem, Midpoint(), 0.03, [0.06, 0.1], (), False, "compiled", threads=k) for k in (1, 2))
     assert max(apart(one, several, ROWS)) < CLOSE
     assert np.abs(several.work[1:]).min() > 1e-6
+
+
+@models([Model("ring", "field"), Model("ring", "steered")])
+def test_links_of_both_digits(model):
+    """Low digits of positions count in links within parts, between them and around the ring."""
+    system, z = uneven(135, model).system, uneven(135, model).start()
+    low, links = np.random.default_rng(2).standard_normal(z.hi.shape), np.zeros(z.hi.shape)
+    pi = np.atleast_2d(z.pi)
+
+    def settle(chain):
+        own = discs(chain.order)
+        state = do.enter(chain, Phase(*(np.ascontiguousarray(array[:, own]) for array in (z.hi, low, pi))))
+        work = do.workspace(chain)
+        do.settle(chain, work, state.hi, state.lo)
+        links[:, own] = work.base[:, HALO + chain.order.places]
+
+    settle(system.lanes)
+    one = links.copy()
+    orders_of = board(135, 2)
+    together(settle, *(chain._replace(order=order) for chain, order in zip(system.parts(2), orders_of, strict=True)))
+    np.testing.assert_array_equal(links, one)
+    assert np.abs(one[0, 0] - (z.hi[0, 0] - z.hi[0, -1])) > 1e-3
 
 
 def test_frames_of_compiled_steps(kernels_as_python):
