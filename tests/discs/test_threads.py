@@ -233,3 +233,13 @@ def test_threads_are_for_chains_in_lanes(kernels_as_python):
     for bad in (0, -1, 1.5, "two", None):
         with pytest.raises(ValueError, match="threads must be a whole number of at least 1"):
             simulate(uneven(5, FIELD), threads=bad)
+
+
+def test_other_threads_are_another_plan(kernels_as_python):
+    """Their kernels are others, too."""
+    problem, method, plans = uneven(135, FIELD), Midpoint(), list[object]()
+    for count in (1, 2, 2):
+        simulate(problem, method, 0.002, [0.002], (), False, "compiled", threads=count)
+        plans.append(problem.kept["plan"][0])
+    assert plans[0] is not plans[1]
+    assert plans[1] is plans[2]
