@@ -71,7 +71,7 @@ def run_once(
     if end / h > MOST_STEPS:
         check_steps(end, h)
     plan, there = planned(problem, integrator, asked, want, h)
-    about = begun(integrator, plan.because, want, h, dt is None, integrator.threads(plan.system))
+    about = begun(integrator, plan.because, want, h, dt is None, plan.threads)
     if more:
         about |= more
     last, started = steps_before(end, h), clock.perf_counter()
@@ -106,11 +106,11 @@ def planned(problem: Problem, integrator: Integrator, asked: Asked, want: tuple[
     The last plan of a problem is kept, unless its runs wait for kernels.
     """
     _, progress, engine, checkpoint = asked
-    last, threads = problem.kept.get("plan"), integrator.threads(problem.system)
+    last = problem.kept.get("plan")
     if last is not None:
-        plan, for_engine, in_memory, shared = last
-        same = plan.integrator is integrator and for_engine is engine and shared == threads and plan.want == want
-        if same and in_memory is (checkpoint is None):
+        plan, for_engine, in_memory = last
+        same = plan.integrator is integrator and for_engine is engine and in_memory is (checkpoint is None) and plan.want == want
+        if same and plan.threads == integrator.threads(plan.system):
             return plan, False
     because = plain_because(problem, integrator, engine, want)
     refuse_loads(problem, integrator)
@@ -120,7 +120,7 @@ def planned(problem: Problem, integrator: Integrator, asked: Asked, want: tuple[
     there = bool(because) or kernels(engine, problem, integrator, h, not recorded, not progress)
     if there:
         plan = Plan(problem, integrator, because, want, recorded and not because)
-        problem.kept["plan"] = plan, engine, checkpoint is None, threads
+        problem.kept["plan"] = plan, engine, checkpoint is None
         return plan, False
     return Plan(problem, integrator, WAITING, want), there
 

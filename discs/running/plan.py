@@ -22,7 +22,7 @@ class Plan:
     system : the equations of motion. s : places of the discs, (n,).
     parameters : of the chain for compiled code; None on the plain engine.
     twin : the method, if its steps are compiled; otherwise None.
-    offered : whether quantities are asked for that the method offers.
+    offered : whether quantities are asked for that the method offers. threads : of compiled steps.
     explicit : whether the step is limited by stability. implicit : whether a fixed step is not. bound : blow-up threshold.
     """
 
@@ -34,6 +34,7 @@ class Plan:
         self.parameters = None if because else self.system.parameters
         self.twin = integrator if self.parameters is not None and isinstance(integrator, FixedStep) else None
         self.offered = not set(want).isdisjoint(integrator.offers)
+        self.threads = integrator.threads(self.system)
         self.explicit = integrator.stability_limit < math.inf
         self.implicit = not self.explicit and not integrator.adaptive
         self.bound = min(problem.blown_up, sys.float_info.max)  # an infinite energy exceeds it
