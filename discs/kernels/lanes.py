@@ -106,12 +106,42 @@ def leave(chain, own, state):
         disc_by_disc(chain, array, to)
 
 
+def most(chain, x):
+    return orders.most(chain.order, x)
+
+
+def added(chain, x):
+    return orders.added(chain.order, x)
+
+
+def halted(chain, size):
+    return orders.halted(chain.order, size)
+
+
 @part(_nrt=True)
 def tied(n, g, count):
     """Workspace for `count` systems of n separators."""
     kind = np.array([g]).dtype
     d, o, columns = np.zeros((count, 3, n), kind), np.zeros((count, 4, n), kind), np.zeros((count, 2, 2, n), kind)
     return Separators(d, o, columns, np.zeros((count, 11), kind), np.zeros((count, 2, n), kind))
+
+
+@part
+def factor_tied(ring, m, n):
+    """Factor the system of n separators, on a ring closed."""
+    if ring:
+        border(m.d, m.o, m.columns, m.edge)
+    else:
+        blocks.factor(m.d, m.o, n)
+
+
+@part
+def solve_tied(ring, m, n):
+    """Solve it for its right side, in place."""
+    if ring:
+        solve_border(m.d, m.o, m.columns, m.edge, m.rest)
+    else:
+        blocks.substitute(m.d, m.o, m.rest, n)
 
 
 @fill(orders.separators, Order, _nrt=True)
@@ -198,19 +228,13 @@ def _factor_separators(order, ring, m, own, sums, ties):
         store(m.d[k], 0, own[k] - after(sums[k]))
     for k in range(4):
         store(m.o[k], 0, after(ties[k]))
-    if ring:
-        border(m.d, m.o, m.columns, m.edge)
-    else:
-        blocks.factor(m.d, m.o, LANES)
+    factor_tied(ring, m, LANES)
 
 
 @fill(orders.solve_separators, Order)
 def _solve_separators(order, ring, m, x, y, at_x, at_y):
     store(m.rest[0], 0, x - after(at_x))
     store(m.rest[1], 0, y - after(at_y))
-    if ring:
-        solve_border(m.d, m.o, m.columns, m.edge, m.rest)
-    else:
-        blocks.substitute(m.d, m.o, m.rest, LANES)
+    solve_tied(ring, m, LANES)
     x, y = load(m.rest[0], 0), load(m.rest[1], 0)
     return x, y, before(x), before(y)

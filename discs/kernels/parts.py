@@ -13,12 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discs.kernels import blocks, lanes, orders
+from discs.kernels import lanes, orders
 from discs.kernels.compiled import PART, fill, later, part
 from discs.kernels.interrupts import interrupted
 from discs.kernels.lanes import HALO
 from discs.kernels.meeting import LINE, meet
-from discs.kernels.steered_matrix import border, solve_border
 from discs.kernels.vectors import LANES, after, before, load, store
 
 NOTES = 12 * LANES  # numbers that a thread tells the others at once, at most
@@ -210,10 +209,7 @@ def _factor_separators(order, ring, m, own, sums, ties):
             m.d[k, j] = here[LANES * k + lane] - there[LANES * (3 + k) + on]
         for k in range(4):
             m.o[k, j] = there[LANES * (6 + k) + on]
-    if ring:
-        border(m.d, m.o, m.columns, m.edge)
-    else:
-        blocks.factor(m.d, m.o, size)
+    lanes.factor_tied(ring, m, size)
 
 
 @fill(orders.solve_separators, Part)
@@ -229,10 +225,7 @@ def _solve_separators(order, ring, m, x, y, at_x, at_y):
         here, there = notes[j // LANES], notes[(j + 1) % size // LANES]
         for k in range(2):
             m.rest[k, j] = here[LANES * k + j % LANES] - there[LANES * (2 + k) + (j + 1) % LANES]
-    if ring:
-        solve_border(m.d, m.o, m.columns, m.edge, m.rest)
-    else:
-        blocks.substitute(m.d, m.o, m.rest, size)
+    lanes.solve_tied(ring, m, size)
     for lane in range(LANES):
         j = (start if start + lane > 0 else size) + lane - 1
         mine[4 * LANES + lane], mine[5 * LANES + lane] = m.rest[0, j], m.rest[1, j]

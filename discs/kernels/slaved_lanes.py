@@ -17,7 +17,7 @@ from discs.kernels.compiled import fill, part
 from discs.kernels.lanes import HALO, Order, order, put
 from discs.kernels.limits import LOST_HEADING
 from discs.kernels.meeting import meet
-from discs.kernels.orders import added, close_links, first_links, halted, join, matrices, most, pick, previous, rejoin
+from discs.kernels.orders import close_links, first_links, join, matrices, most, pick, previous, rejoin
 from discs.kernels.parts import Part, beside, side
 from discs.kernels.slaved import Slaved
 from discs.kernels.slaved_matrix import GHOST, RING
@@ -251,19 +251,9 @@ def _vanishing(chain):
     return do.vanishing(chain.rolling)
 
 
-@fill(do.most, *LANED)
-def _most(chain, x):
-    return most(chain.order, x)
-
-
-@fill(do.added, *LANED)
-def _added(chain, x):
-    return added(chain.order, x)
-
-
-@fill(do.halted, *LANED)
-def _halted(chain, size):
-    return halted(chain.order, size)
+fill(do.most, *LANED)(lanes.most)
+fill(do.added, *LANED)(lanes.added)
+fill(do.halted, *LANED)(lanes.halted)
 
 
 @fill(do.lost, *LANED)

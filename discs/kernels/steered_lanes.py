@@ -16,7 +16,7 @@ from discs.kernels import protocol as do
 from discs.kernels.abreast import Abreast
 from discs.kernels.compiled import fill
 from discs.kernels.lanes import HALO, Order, order, put
-from discs.kernels.orders import added, first_links, halted, join, most, previous
+from discs.kernels.orders import first_links, join, previous
 from discs.kernels.parts import Part
 from discs.kernels.steered import Steered
 from discs.kernels.steered_links import turn
@@ -167,19 +167,9 @@ def _vanishing(chain):
     return False
 
 
-@fill(do.most, *TURNING)
-def _most(chain, x):
-    return most(chain.order, x)
-
-
-@fill(do.added, *TURNING)
-def _added(chain, x):
-    return added(chain.order, x)
-
-
-@fill(do.halted, *TURNING)
-def _halted(chain, size):
-    return halted(chain.order, size)
+fill(do.most, *TURNING)(lanes.most)
+fill(do.added, *TURNING)(lanes.added)
+fill(do.halted, *TURNING)(lanes.halted)
 
 
 @fill(do.lost, *TURNING)
